@@ -1,0 +1,51 @@
+// The encoder's inbox. Plain values only: peers may include this file and nothing else of the room.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "actors/runtime/overflow.hpp"
+#include "actors/types/frame_stamps.hpp"
+#include "actors/types/ids.hpp"
+#include "actors/types/tile_id.hpp"
+#include "actors/types/tile_image.hpp"
+
+namespace darm::encoder {
+
+/// A slot whose picture changes in this frame.
+struct SlotWrite {
+  SlotIndex slot = kNoSlot;
+  std::shared_ptr<const TileImage> image;
+};
+
+/// One change of the page table: `tile` is now in `slot`, or absent (kNoSlot). With coverage where the tile has alpha.
+struct PageEdit {
+  TileId tile;
+  SlotIndex slot = kNoSlot;
+  std::shared_ptr<const CoverageTile> coverage;  ///< only with a slot, and only the first time; null: opaque
+};
+
+/// Make one frame. At most one per stream is under way: the scheduler waits for FrameDone.
+struct ComposeFrame {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  FrameNumber frame = 0;
+  bool key = false;              ///< IDR picture; `edits` then hold the whole page table
+  std::vector<SlotWrite> writes;
+  std::vector<PageEdit> edits;   ///< replaces the whole table when `key`
+  std::vector<ViewAnswer> answers;
+  float error = 0;               ///< estimated RMS display error of the view, 0..1
+  ComposeFrame(FrameNumber number, bool is_key) : frame(number), key(is_key) {}
+};
+
+/// The pool has encoded the frame (the encoder sends it to itself).
+struct PictureEncoded {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  FrameNumber frame = 0;
+  explicit PictureEncoded(FrameNumber number) : frame(number) {}
+};
+
+using Inbox = std::variant<ComposeFrame, PictureEncoded>;
+
+}  // namespace darm::encoder

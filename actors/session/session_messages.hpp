@@ -1,0 +1,67 @@
+// A session's inbox, as far as other rooms write to it. Plain values only: peers may include this file alone.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "actors/encoder/encoder_messages.hpp"
+#include "actors/runtime/overflow.hpp"
+#include "actors/types/frame_stamps.hpp"
+#include "actors/types/ids.hpp"
+
+namespace darm::session {
+
+/// One encoded picture with everything that must be applied with it. Shared by all sessions of the stream.
+struct EncodedFrame {
+  StreamId stream{};
+  FrameNumber frame = 0;
+  bool key = false;
+  std::vector<std::uint8_t> h264;               ///< Annex B, parameter sets in band on key frames; empty if lossless
+  std::vector<encoder::SlotWrite> lossless;     ///< only for lossless_rgb streams
+  std::vector<encoder::PageEdit> edits;         ///< the whole table when `key`
+  float error = 0;
+};
+
+/// A frame for this session. `answer` names the camera it answers (sequence 0: none of this session's).
+struct FrameEncoded {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;  ///< bounded by the session's own send queue
+  std::shared_ptr<const EncodedFrame> frame;
+  ViewAnswer answer;
+  FrameEncoded(std::shared_ptr<const EncodedFrame> f, const ViewAnswer& a) : frame(std::move(f)), answer(a) {}
+};
+
+/// The camera was looked at and nothing perceptible changed.
+struct NoChange {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  ViewAnswer answer;
+  float error = 0;
+  NoChange(const ViewAnswer& a, float e) : answer(a), error(e) {}
+};
+
+/// The whole coarse level, newly encoded as an H.264 key frame. Replaces what the client had.
+struct CoarseTexture {
+  std::uint32_t version = 0;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> h264;
+};
+
+struct CoarseUpdated {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  std::shared_ptr<const CoarseTexture> coarse;
+  explicit CoarseUpdated(std::shared_ptr<const CoarseTexture> c) : coarse(std::move(c)) {}
+};
+
+/// The daemon stops, or the stream failed for good: say goodbye with this reason and close.
+struct CloseSession {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  std::uint32_t code = 0;  ///< a darm.proto Goodbye.Reason
+  CloseSession() = default;
+  explicit CloseSession(std::uint32_t c) : code(c) {}
+};
+
+using Inbox = std::variant<FrameEncoded, NoChange, CoarseUpdated, CloseSession>;
+
+}  // namespace darm::session

@@ -1,0 +1,98 @@
+// The tile scheduler's inbox. Plain values only: peers may include this file and nothing else of the room.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "actors/runtime/overflow.hpp"
+#include "actors/types/camera.hpp"
+#include "actors/types/frame_stamps.hpp"
+#include "actors/types/ids.hpp"
+#include "actors/types/tile_image.hpp"
+
+namespace darm::tile_scheduler {
+
+/// How a session receives its PhysTex. `lossless_rgb`: no codec, tiles as they are (evaluation; config must allow it).
+struct StreamFormat {
+  std::uint32_t phystex_size = 2048;  ///< pixels, square: 1024, 2048 or 4096 (lossless: up to 16384)
+  bool chroma_444 = false;
+  bool lossless_rgb = false;
+};
+
+/// A client finished its handshake and is ready for frames.
+struct SessionOpened {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  SessionId session{};
+  StreamFormat format;
+  SessionOpened(SessionId id, StreamFormat f) : session(id), format(f) {}
+};
+
+struct SessionClosed {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  SessionId session{};
+  explicit SessionClosed(SessionId id) : session(id) {}
+};
+
+/// Newest camera of a session. Validated by the session before it is sent.
+struct ViewChanged {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
+  SessionId session{};
+  CameraSequence sequence = 0;
+  Camera camera;
+  Viewport viewport;
+  FrameStamps stamps;
+  ViewChanged(SessionId id, CameraSequence seq, const Camera& c, const Viewport& v, const FrameStamps& s)
+      : session(id), sequence(seq), camera(c), viewport(v), stamps(s) {}
+  [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
+};
+
+/// The session lost a frame or joined late: its next frame must be a key frame with the whole page table.
+struct KeyFrameWanted {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
+  SessionId session{};
+  explicit KeyFrameWanted(SessionId id) : session(id) {}
+  [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
+};
+
+/// A tile has a new picture. `error` is its estimated RMS display error (0..1), `samples` the mean samples per seen texel.
+struct ShadedTile {
+  TileId tile;
+  std::uint32_t version = 0;
+  float error = 0;
+  float samples = 0;
+  std::shared_ptr<const TileImage> image;
+};
+
+struct TilesShaded {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  std::vector<ShadedTile> tiles;
+  explicit TilesShaded(std::vector<ShadedTile> t) : tiles(std::move(t)) {}
+};
+
+/// The encoder has finished a frame of a stream: the scheduler may send the next ComposeFrame.
+struct FrameDone {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  StreamId stream{};
+  FrameNumber frame = 0;
+  bool ok = true;
+  FrameDone(StreamId s, FrameNumber f, bool success) : stream(s), frame(f), ok(success) {}
+};
+
+/// Visibility of one session's view is traced (sent by the scheduler's own pool job to itself).
+struct ViewTraced {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  std::uint64_t job = 0;
+  explicit ViewTraced(std::uint64_t number) : job(number) {}
+};
+
+/// The update clock: at each tick the scheduler traces, allocates and sends frames.
+struct Tick {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+};
+
+using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, FrameDone,
+                           ViewTraced, Tick>;
+
+}  // namespace darm::tile_scheduler
