@@ -1,4 +1,5 @@
-// What a full mailbox does with one more message. Each message type names its policy: `static constexpr auto kOverflow`.
+// What a full mailbox does with one more message. Each message type names its policy: `static constexpr auto
+// kOverflow`.
 #pragma once
 
 #include <cstdint>
