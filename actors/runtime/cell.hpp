@@ -52,6 +52,8 @@ class CellBase : public std::enable_shared_from_this<CellBase> {
   void request_stop();
   /// Starts the actor (on_start is its first turn).
   void start();
+  /// Instead of start(): destroys the actor on the calling thread.
+  void abandon();
   /// One turn: handles some messages, or starts or destroys the actor. Called by the host only.
   void run_turn();
 

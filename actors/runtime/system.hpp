@@ -42,8 +42,7 @@ class System {
         std::move(actor), [raw] { raw->on_start(); },
         [raw](Inbox&& inbox) { std::visit([raw](auto&& message) { raw->on(std::move(message)); }, std::move(inbox)); });
     if (!admit(cell)) {
-      cell->request_stop();
-      cell->start();  // its only turn destroys the actor
+      cell->abandon();
       return {};
     }
     cell->start();
