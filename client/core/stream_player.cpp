@@ -1,0 +1,147 @@
+#include "client/core/stream_player.hpp"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <span>
+#include <utility>
+
+namespace darm::client {
+namespace {
+
+constexpr std::uint32_t kSlotTexels = kSlotSize * kSlotSize;
+constexpr std::uint32_t kNoTile = 0xffffffffu;
+
+std::span<const std::uint8_t> bytes_of(const std::string& s) {
+  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
+}
+
+// Exactly one slot of coverage, or nothing.
+std::optional<std::string> inflate_coverage(const std::string& packed) {
+  std::string out(kSlotTexels, '\0');
+  uLongf size = kSlotTexels;
+  const int code = uncompress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+  if (code != Z_OK || size != kSlotTexels) return std::nullopt;
+  return out;
+}
+
+}  // namespace
+
+StreamPlayer::StreamPlayer(VideoDecoder decoder, VideoDecoder still_decoder, const SceneModel& scene, const StreamShape& shape)
+    : decoder_(std::move(decoder)),
+      still_decoder_(std::move(still_decoder)),
+      shape_(shape),
+      pages_(scene.tile_count()),
+      slot_tile_(shape.slot_count(), kNoTile),
+      slot_masked_(shape.slot_count(), false) {}
+
+Result<StreamPlayer> StreamPlayer::create(const SceneModel& scene, const StreamShape& shape) {
+  const std::uint32_t most = shape.lossless ? 16384 : 4096;
+  if (shape.phystex_size < kSlotSize || shape.phystex_size > most || shape.phystex_size % kSlotSize != 0) {
+    return fail(fmt::format("welcome: PhysTex of {} pixels refused", shape.phystex_size));
+  }
+  auto decoder = VideoDecoder::create(shape.phystex_size, shape.phystex_size);
+  if (!decoder) return std::unexpected(decoder.error());
+  const auto& coarse = scene.levels().back();
+  auto still = VideoDecoder::create(coarse.width, coarse.height);
+  if (!still) return std::unexpected(still.error());
+  return StreamPlayer(std::move(*decoder), std::move(*still), scene, shape);
+}
+
+Result<std::vector<StreamPlayer::Edit>> StreamPlayer::read_edits(const wire::StreamFrame& frame, const SceneModel& scene) const {
+  std::vector<Edit> edits;
+  edits.reserve(static_cast<std::size_t>(frame.page_edits_size()));
+  for (const auto& info : frame.page_edits()) {
+    Edit edit{};
+    if (!scene.page_entry(info.tile(), edit.entry)) return fail(fmt::format("frame {}: no such tile {:#x}", frame.frame(), info.tile()));
+    if (info.slot() != kAbsent && info.slot() >= shape_.slot_count()) return fail(fmt::format("frame {}: no such slot {}", frame.frame(), info.slot()));
+    edit.slot = static_cast<std::uint16_t>(info.slot());
+    if (!info.coverage().empty()) {
+      auto coverage = inflate_coverage(info.coverage());
+      if (!coverage) return fail(fmt::format("frame {}: coverage of tile {:#x} is not 32x32", frame.frame(), info.tile()));
+      edit.coverage = std::move(*coverage);
+    }
+    edits.push_back(std::move(edit));
+  }
+  return edits;
+}
+
+Result<void> StreamPlayer::check_pixels(const wire::StreamFrame& frame) const {
+  if (frame.pixels_size() > 0 && !shape_.lossless) return fail(fmt::format("frame {}: bare pixels on a coded stream", frame.frame()));
+  for (const auto& p : frame.pixels()) {
+    if (p.slot() >= shape_.slot_count() || p.rgb().size() != kSlotTexels * 3) {
+      return fail(fmt::format("frame {}: slot pixels out of range", frame.frame()));
+    }
+  }
+  return {};
+}
+
+void StreamPlayer::lose_track() {
+  ++frames_lost_;
+  if (!key_wanted_) decoder_.reset();
+  key_wanted_ = true;
+}
+
+Result<FrameFate> StreamPlayer::apply(const wire::StreamFrame& frame, const SceneModel& scene) {
+  if (!frame.key() && (key_wanted_ || frame.frame() != last_frame_ + 1)) {
+    lose_track();
+    return FrameFate::kSkipped;
+  }
+  auto edits = read_edits(frame, scene);
+  if (!edits) return std::unexpected(edits.error());
+  if (auto ok = check_pixels(frame); !ok) return std::unexpected(ok.error());
+  if (!shape_.lossless && (frame.key() || !frame.h264().empty())) {
+    if (frame.key()) decoder_.reset();
+    const auto decoded = decoder_.decode(bytes_of(frame.h264()), next_picture_);
+    if (!decoded) {
+      key_wanted_ = false;  // so that lose_track() resets the decoder
+      lose_track();
+      return FrameFate::kSkipped;
+    }
+    if (next_picture_.width != shape_.phystex_size || next_picture_.height != shape_.phystex_size) {
+      return fail(fmt::format("frame {}: picture is {}x{}, not the size agreed", frame.frame(), next_picture_.width, next_picture_.height));
+    }
+    std::swap(picture_, next_picture_);
+    picture_new_ = true;
+  }
+  commit(frame, std::move(*edits));
+  return FrameFate::kApplied;
+}
+
+void StreamPlayer::commit(const wire::StreamFrame& frame, std::vector<Edit> edits) {
+  if (frame.key()) pages_.clear();
+  for (auto& edit : edits) {
+    pages_.set(edit.entry, edit.slot);
+    if (edit.slot == kAbsent) continue;
+    const bool same_tile = slot_tile_[edit.slot] == edit.entry;
+    slot_tile_[edit.slot] = edit.entry;
+    if (!edit.coverage.empty()) {
+      coverage_[edit.slot] = std::move(edit.coverage);
+      slot_masked_[edit.slot] = true;
+    } else if (!same_tile && slot_masked_[edit.slot]) {  // coverage is sent once: a tile that stays keeps its own
+      coverage_[edit.slot] = std::string(kSlotTexels, '\xff');
+      slot_masked_[edit.slot] = false;
+    }
+  }
+  for (const auto& p : frame.pixels()) pixels_[static_cast<std::uint16_t>(p.slot())] = p.rgb();
+  last_frame_ = frame.frame();
+  key_wanted_ = false;
+}
+
+Result<void> StreamPlayer::apply(const wire::CoarseTexture& coarse, const SceneModel& scene) {
+  const auto& level = scene.levels().back();
+  if (coarse.width() != level.width || coarse.height() != level.height) return fail("coarse texture: size differs from the manifest");
+  Picture picture;
+  still_decoder_.reset();
+  if (auto ok = still_decoder_.decode(bytes_of(coarse.h264()), picture); !ok) return std::unexpected(Error("coarse texture: " + ok.error().message));
+  if (picture.width != level.width || picture.height != level.height) return fail("coarse texture: picture has another size");
+  coarse_ = std::move(picture);
+  coarse_new_ = true;
+  has_coarse_ = true;
+  return {};
+}
+
+const Picture* StreamPlayer::take_picture() { return std::exchange(picture_new_, false) ? &picture_ : nullptr; }
+const Picture* StreamPlayer::take_coarse() { return std::exchange(coarse_new_, false) ? &coarse_ : nullptr; }
+
+}  // namespace darm::client
