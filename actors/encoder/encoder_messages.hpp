@@ -31,11 +31,11 @@ struct PageEdit {
 struct ComposeFrame {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
   FrameNumber frame = 0;
-  bool key = false;              ///< IDR picture; `edits` then hold the whole page table
+  bool key = false;  ///< IDR picture; `edits` then hold the whole page table
   std::vector<SlotWrite> writes;
-  std::vector<PageEdit> edits;   ///< replaces the whole table when `key`
+  std::vector<PageEdit> edits;  ///< replaces the whole table when `key`
   std::vector<ViewAnswer> answers;
-  float error = 0;               ///< estimated RMS display error of the view, 0..1
+  float error = 0;  ///< estimated RMS display error of the view, 0..1
   ComposeFrame(FrameNumber number, bool is_key) : frame(number), key(is_key) {}
 };
 
