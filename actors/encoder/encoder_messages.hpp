@@ -48,4 +48,36 @@ struct PictureEncoded {
 
 using Inbox = std::variant<ComposeFrame, PictureEncoded>;
 
+/// The whole coarse level as a picture. Immutable; `rgb` is sRGB-encoded, interleaved, width * height * 3 bytes.
+struct CoarsePicture {
+  std::uint32_t version = 0;  ///< rises with every new picture
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// There is a new picture of the coarse level: encode it and send it to every session.
+struct CoarseShaded {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  std::shared_ptr<const CoarsePicture> picture;
+  explicit CoarseShaded(std::shared_ptr<const CoarsePicture> p) : picture(std::move(p)) {}
+};
+
+/// A session has nothing of the coarse level yet.
+struct CoarseWanted {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
+  SessionId session{};
+  explicit CoarseWanted(SessionId id) : session(id) {}
+  [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
+};
+
+/// The pool has encoded the coarse picture (the coarse encoder sends it to itself).
+struct CoarseEncoded {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  std::uint32_t version = 0;
+  explicit CoarseEncoded(std::uint32_t number) : version(number) {}
+};
+
+using CoarseInbox = std::variant<CoarseShaded, CoarseWanted, CoarseEncoded>;
+
 }  // namespace darm::encoder

@@ -1,0 +1,169 @@
+#include "actors/encoder/encoder_actor.hpp"
+
+#include <algorithm>
+#include <exception>
+
+#include "actors/encoder/h264_encoder.hpp"
+#include "actors/encoder/phystex_picture.hpp"
+
+namespace darm::encoder {
+namespace {
+
+Microseconds micros(const runtime::Executor& executor) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(executor.now().time_since_epoch()).count();
+}
+
+double seconds(Microseconds from, Microseconds to) { return static_cast<double>(to - from) * 1e-6; }
+
+}  // namespace
+
+// Picture and codec of the stream. The codec may be missing after a failure; the next key frame makes it anew.
+struct EncoderActor::Pipeline {
+  explicit Pipeline(const EncoderOptions& o) : lossless(o.lossless_rgb) {
+    settings.width = o.phystex_size;
+    settings.height = o.phystex_size;
+    settings.chroma_444 = o.chroma_444;
+    settings.crf = o.crf;
+    settings.preset = o.preset;
+    settings.codec = o.codec;
+    settings.threads = o.threads;
+    settings.frames_per_second = o.frames_per_second;
+    if (!lossless) picture.emplace(o.phystex_size, o.chroma_444);
+  }
+  H264Settings settings;
+  bool lossless;
+  std::optional<PhysTexPicture> picture;
+  std::unique_ptr<H264Encoder> encoder;
+};
+
+struct EncoderActor::Job {
+  explicit Job(ComposeFrame&& c) : command(std::move(c)) {}
+  ComposeFrame command;
+  std::shared_ptr<session::EncodedFrame> frame = std::make_shared<session::EncodedFrame>();
+  Microseconds started = 0;
+  Microseconds composed = 0;
+  Microseconds encoded = 0;
+  std::string error;  // empty: frame is good
+};
+
+EncoderActor::EncoderActor(runtime::Context<Inbox> context, EncoderOptions options, Receivers receivers,
+                           runtime::Ref<tile_scheduler::Inbox> scheduler, runtime::MetricSink& metrics)
+    : Actor(std::move(context)),
+      options_(std::move(options)),
+      receivers_(std::move(receivers)),
+      scheduler_(std::move(scheduler)),
+      metrics_(metrics),
+      pipeline_(std::make_shared<Pipeline>(options_)) {}
+
+EncoderActor::~EncoderActor() = default;
+
+void EncoderActor::on(ComposeFrame&& command) {
+  waiting_.push_back(std::move(command));
+  if (job_) return;
+  auto next = std::move(waiting_.front());
+  waiting_.pop_front();
+  begin(std::move(next));
+}
+
+void EncoderActor::begin(ComposeFrame&& command) {
+  if (key_required_ && !command.key) {
+    // Its edits build on a page table that clients of the failed frame do not have. The tiles are still worth keeping.
+    if (pipeline_->picture) {
+      for (const auto& w : command.writes) {
+        if (w.image) pipeline_->picture->write(w.slot, *w.image);
+      }
+    }
+    scheduler_.tell(tile_scheduler::FrameDone(options_.stream, command.frame, false));
+    return;
+  }
+  job_ = std::make_shared<Job>(std::move(command));
+  auto work = [pipeline = pipeline_, job = job_, &world = executor(), me = self()] {
+    run(*pipeline, *job, world);
+    me.tell(PictureEncoded(job->command.frame));
+  };
+  executor().post(runtime::Priority::kHigh, std::move(work));
+}
+
+void EncoderActor::run(Pipeline& pipeline, Job& job, const runtime::Executor& executor) {
+  job.started = micros(executor);
+  auto& frame = *job.frame;
+  frame.frame = job.command.frame;
+  frame.key = job.command.key;
+  frame.error = job.command.error;
+  try {
+    if (pipeline.lossless) {
+      frame.lossless = std::move(job.command.writes);
+      job.composed = micros(executor);
+    } else {
+      for (const auto& w : job.command.writes) {
+        if (!w.image || !pipeline.picture->write(w.slot, *w.image)) job.error = "a write names no slot or no image";
+      }
+      job.composed = micros(executor);
+      if (!pipeline.encoder) {
+        auto made = H264Encoder::create(pipeline.settings);
+        if (made) {
+          pipeline.encoder = std::move(*made);
+        } else {
+          job.error = made.error().message;
+        }
+      }
+      if (job.error.empty()) {
+        auto bytes = pipeline.encoder->encode(pipeline.picture->view(), frame.key);
+        if (bytes) {
+          frame.h264 = std::move(*bytes);
+        } else {
+          job.error = bytes.error().message;
+        }
+      }
+    }
+    frame.edits = std::move(job.command.edits);
+  } catch (const std::exception& e) {
+    job.error = e.what();
+  }
+  if (!job.error.empty()) pipeline.encoder.reset();
+  job.encoded = micros(executor);
+}
+
+void EncoderActor::on(PictureEncoded&& event) {
+  if (!job_ || job_->command.frame != event.frame) return;
+  const auto job = std::exchange(job_, nullptr);
+  key_required_ = !job->error.empty();
+  record(*job);
+  if (job->error.empty()) publish(*job);
+  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty()));
+  while (!job_ && !waiting_.empty()) {
+    auto next = std::move(waiting_.front());
+    waiting_.pop_front();
+    begin(std::move(next));
+  }
+}
+
+void EncoderActor::publish(Job& job) {
+  job.frame->stream = options_.stream;
+  const std::shared_ptr<const session::EncodedFrame> frame = job.frame;
+  for (const auto& [id, ref] : receivers_()) {
+    ViewAnswer answer;
+    answer.session = id;
+    const auto own = std::find_if(job.command.answers.begin(), job.command.answers.end(),
+                                  [&, wanted = id](const ViewAnswer& a) { return a.session == wanted; });
+    if (own != job.command.answers.end()) answer = *own;
+    answer.stamps.encode_started = job.started;
+    answer.stamps.picture_composed = job.composed;
+    answer.stamps.encoded = job.encoded;
+    if (!ref.tell(session::FrameEncoded(frame, answer))) metrics_.count("darm_encoder_frames_refused_total");
+  }
+}
+
+void EncoderActor::record(const Job& job) {
+  if (!job.error.empty()) {
+    metrics_.count("darm_encoder_failures_total");
+    return;
+  }
+  metrics_.observe("darm_encoder_compose_seconds", seconds(job.started, job.composed));
+  metrics_.observe("darm_encoder_encode_seconds", seconds(job.composed, job.encoded));
+  metrics_.count("darm_encoder_frames_total");
+  metrics_.count("darm_encoder_bytes_total", static_cast<double>(job.frame->h264.size()));
+  if (job.frame->key) metrics_.count("darm_encoder_key_frames_total");
+}
+
+}  // namespace darm::encoder
