@@ -150,7 +150,11 @@ void EncoderActor::publish(Job& job) {
     answer.stamps.encode_started = job.started;
     answer.stamps.picture_composed = job.composed;
     answer.stamps.encoded = job.encoded;
-    if (!ref.tell(session::FrameEncoded(frame, answer))) metrics_.count("darm_encoder_frames_refused_total");
+    if (!ref.tell(session::FrameEncoded(frame, answer))) {
+      // A session that is too busy to take the frame has lost it; later ones would build on what it lacks.
+      metrics_.count("darm_encoder_frames_refused_total");
+      scheduler_.tell(tile_scheduler::KeyFrameWanted(id));
+    }
   }
 }
 

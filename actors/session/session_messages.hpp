@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -11,6 +12,10 @@
 #include "actors/types/frame_stamps.hpp"
 #include "actors/types/ids.hpp"
 
+namespace darm::wire {
+class DatagramBody;
+}
+
 namespace darm::session {
 
 /// One encoded picture with everything that must be applied with it. Shared by all sessions of the stream.
@@ -18,9 +23,9 @@ struct EncodedFrame {
   StreamId stream{};
   FrameNumber frame = 0;
   bool key = false;
-  std::vector<std::uint8_t> h264;               ///< Annex B, parameter sets in band on key frames; empty if lossless
-  std::vector<encoder::SlotWrite> lossless;     ///< only for lossless_rgb streams
-  std::vector<encoder::PageEdit> edits;         ///< the whole table when `key`
+  std::vector<std::uint8_t> h264;            ///< Annex B, parameter sets in band on key frames; empty if lossless
+  std::vector<encoder::SlotWrite> lossless;  ///< only for lossless_rgb streams
+  std::vector<encoder::PageEdit> edits;      ///< the whole table when `key`
   float error = 0;
 };
 
@@ -62,6 +67,42 @@ struct CloseSession {
   explicit CloseSession(std::uint32_t c) : code(c) {}
 };
 
-using Inbox = std::variant<FrameEncoded, NoChange, CoarseUpdated, CloseSession>;
+// ---- from the session's own socket and timer; other rooms do not send these ----------------------------------------
+
+/// Bytes of the TCP stream. At most one waits: the next piece is read when this one is handled.
+struct BytesReceived {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  std::vector<std::uint8_t> bytes;
+  explicit BytesReceived(std::vector<std::uint8_t> b) : bytes(std::move(b)) {}
+};
+
+/// The packet under way is with the kernel.
+struct BytesSent {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  std::size_t count = 0;
+  explicit BytesSent(std::size_t n) : count(n) {}
+};
+
+/// The connection is gone: end of stream or an error.
+struct SocketClosed {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  std::string why;
+  explicit SocketClosed(std::string reason) : why(std::move(reason)) {}
+};
+
+/// An authenticated datagram of this session.
+struct DatagramReceived {
+  static constexpr auto kOverflow = runtime::Overflow::kDropOldest;
+  std::shared_ptr<const wire::DatagramBody> body;
+  explicit DatagramReceived(std::shared_ptr<const wire::DatagramBody> b) : body(std::move(b)) {}
+};
+
+/// Time-outs are looked at.
+struct Tick {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+};
+
+using Inbox = std::variant<FrameEncoded, NoChange, CoarseUpdated, CloseSession, BytesReceived, BytesSent, SocketClosed,
+                           DatagramReceived, Tick>;
 
 }  // namespace darm::session
