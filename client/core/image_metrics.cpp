@@ -75,7 +75,8 @@ double mssim(const Plane& a, const Plane& b) {
     const double va = aa.v[i] - ma.v[i] * ma.v[i];
     const double vb = bb.v[i] - mb.v[i] * mb.v[i];
     const double cov = ab.v[i] - ma.v[i] * mb.v[i];
-    sum += ((2 * ma.v[i] * mb.v[i] + c1) * (2 * cov + c2)) / ((ma.v[i] * ma.v[i] + mb.v[i] * mb.v[i] + c1) * (va + vb + c2));
+    sum += ((2 * ma.v[i] * mb.v[i] + c1) * (2 * cov + c2)) /
+           ((ma.v[i] * ma.v[i] + mb.v[i] * mb.v[i] + c1) * (va + vb + c2));
   }
   return sum / static_cast<double>(ma.v.size());
 }
@@ -91,7 +92,8 @@ double psnr_of(double mse) { return -10.0 * std::log10(std::max(mse, 1e-10)); }
 
 Result<PictureScore> compare(const Image8& picture, const Reference& reference) {
   if (!same_shape(reference)) return fail("reference: its halves differ in size");
-  if (picture.width != reference.a.width || picture.height != reference.a.height || picture.rgb.size() != reference.a.rgb.size()) {
+  if (picture.width != reference.a.width || picture.height != reference.a.height ||
+      picture.rgb.size() != reference.a.rgb.size()) {
     return fail("reference: its size differs from the picture's");
   }
   if (picture.width < kWindow || picture.height < kWindow) return fail("reference: picture is smaller than 11x11");

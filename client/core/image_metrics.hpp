@@ -17,10 +17,10 @@ struct PictureScore {
   double rmse = 0;   ///< of display RGB, 0..1
 };
 
-/// MSE = mean((p - a)(p - b)) over display RGB (sRGB-encoded, 0..1): the noise of the halves is independent, so it cancels.
-/// Not positive (noise larger than the distance): clamped to 1e-10 (100 dB).
-/// MSSIM (Wang et al. 2004): 11x11 Gaussian window, sigma 1.5, K1 = 0.01, K2 = 0.03, luma of display values in 0..255,
-/// against the mean of the halves, windows wholly inside the picture. Pictures under 11x11 give an error.
+/// MSE = mean((p - a)(p - b)) over display RGB (sRGB-encoded, 0..1): the noise of the halves is independent, so it
+/// cancels. Not positive (noise larger than the distance): clamped to 1e-10 (100 dB). MSSIM (Wang et al. 2004): 11x11
+/// Gaussian window, sigma 1.5, K1 = 0.01, K2 = 0.03, luma of display values in 0..255, against the mean of the halves,
+/// windows wholly inside the picture. Pictures under 11x11 give an error.
 [[nodiscard]] Result<PictureScore> compare(const Image8& picture, const Reference& reference);
 /// Own accuracy of the mean of the halves, dB: its MSE is mean((a - b)^2) / 4.
 [[nodiscard]] Result<double> reference_psnr(const Reference& reference);

@@ -53,11 +53,12 @@ Result<void> SceneModel::read_levels(const wire::SceneManifest& manifest) {
   q_ = manifest.q();
   if (!(std::isfinite(q_) && q_ > 0)) return fail("manifest: q is not a positive number");
   const auto count = static_cast<std::uint32_t>(manifest.levels_size());
-  if (count == 0 || count > kMaxLevels) return fail(fmt::format("manifest: {} levels, expected 1 to {}", count, kMaxLevels));
+  if (count == 0 || count > kMaxLevels)
+    return fail(fmt::format("manifest: {} levels, expected 1 to {}", count, kMaxLevels));
   std::uint64_t tiles = 0;
   for (const auto& info : manifest.levels()) {
-    LevelShape level{info.density(), info.width(), info.height(), info.tiles_x(), info.tiles_y(),
-                     static_cast<std::uint32_t>(tiles)};
+    LevelShape level{info.density(), info.width(),   info.height(),
+                     info.tiles_x(), info.tiles_y(), static_cast<std::uint32_t>(tiles)};
     if (!(std::isfinite(level.density) && level.density > 0)) return fail("manifest: level without a density");
     if (level.tiles_x == 0 || level.tiles_y == 0 || std::uint64_t{level.tiles_x} * kTileSize != level.width ||
         std::uint64_t{level.tiles_y} * kTileSize != level.height) {
@@ -74,7 +75,8 @@ Result<void> SceneModel::read_levels(const wire::SceneManifest& manifest) {
 Result<void> SceneModel::read_patches(const wire::SceneManifest& manifest) {
   patch_count_ = manifest.patch_count();
   const std::uint64_t entries = std::uint64_t{patch_count_} * levels_.size();
-  if (patch_count_ == 0 || entries > kMaxTableEntries) return fail(fmt::format("manifest: {} patches refused", patch_count_));
+  if (patch_count_ == 0 || entries > kMaxTableEntries)
+    return fail(fmt::format("manifest: {} patches refused", patch_count_));
   const auto& packed = manifest.patch_table();
   if (entries > most_vertices(packed.size(), sizeof(PatchPlace))) return fail("manifest: patch table is too short");
   places_.resize(entries);
@@ -92,7 +94,8 @@ Result<void> SceneModel::read_patches(const wire::SceneManifest& manifest) {
 }
 
 Result<void> SceneModel::read_instances(const wire::SceneManifest& manifest) {
-  if (static_cast<std::uint64_t>(manifest.instances_size()) > limits_.max_instances) return fail("manifest: too many instances");
+  if (static_cast<std::uint64_t>(manifest.instances_size()) > limits_.max_instances)
+    return fail("manifest: too many instances");
   if (manifest.chart_count() > limits_.max_instances) return fail("manifest: too many charts");
   highest_base_.assign(manifest.chart_count(), 0);
   instances_.reserve(static_cast<std::size_t>(manifest.instances_size()));
@@ -100,7 +103,8 @@ Result<void> SceneModel::read_instances(const wire::SceneManifest& manifest) {
     InstanceShape instance;
     instance.chart = info.chart();
     if (instance.chart >= manifest.chart_count()) return fail("manifest: an instance names no chart");
-    if (info.to_world_size() != 16 || !all_finite(info.to_world())) return fail("manifest: an instance has no finite matrix");
+    if (info.to_world_size() != 16 || !all_finite(info.to_world()))
+      return fail("manifest: an instance has no finite matrix");
     for (int i = 0; i < 16; ++i) instance.to_world[i / 4][i % 4] = info.to_world(i);
     instance.front_base = info.front_base();
     instance.back_base = info.back_base();
@@ -111,7 +115,8 @@ Result<void> SceneModel::read_instances(const wire::SceneManifest& manifest) {
     if (info.alpha_mode() > 2) return fail("manifest: unknown alpha mode");
     instance.alpha_mode = static_cast<AlphaMode>(info.alpha_mode());
     has_alpha_ = has_alpha_ || instance.alpha_mode != AlphaMode::kOpaque;
-    if (!std::isfinite(info.alpha_cutoff()) || !std::isfinite(info.transmission())) return fail("manifest: NaN in an instance");
+    if (!std::isfinite(info.alpha_cutoff()) || !std::isfinite(info.transmission()))
+      return fail("manifest: NaN in an instance");
     instance.alpha_cutoff = info.alpha_cutoff();
     instance.transmission = std::clamp(info.transmission(), 0.0f, 1.0f);
     instance.tint = unpack_linear(info.tint_rgb());
@@ -127,14 +132,16 @@ Result<void> SceneModel::read_instances(const wire::SceneManifest& manifest) {
 Result<void> SceneModel::read_surroundings(const wire::SceneManifest& manifest) {
   origin_ = {manifest.origin().x(), manifest.origin().y(), manifest.origin().z()};
   if (!std::isfinite(origin_.x + origin_.y + origin_.z)) return fail("manifest: origin is not finite");
-  if (manifest.bounds_size() != 6 || !all_finite(manifest.bounds())) return fail("manifest: bounds are not six finite numbers");
+  if (manifest.bounds_size() != 6 || !all_finite(manifest.bounds()))
+    return fail("manifest: bounds are not six finite numbers");
   low_ = {manifest.bounds(0), manifest.bounds(1), manifest.bounds(2)};
   high_ = {manifest.bounds(3), manifest.bounds(4), manifest.bounds(5)};
   background_.zenith = unpack_linear(manifest.sky_rgb_zenith());
   background_.horizon = unpack_linear(manifest.sky_rgb_horizon());
   background_.ground = unpack_linear(manifest.sky_rgb_ground());
   if (manifest.sun_size() == 0) return {};
-  if (manifest.sun_size() != 7 || !all_finite(manifest.sun())) return fail("manifest: the sun is not seven finite numbers");
+  if (manifest.sun_size() != 7 || !all_finite(manifest.sun()))
+    return fail("manifest: the sun is not seven finite numbers");
   const glm::vec3 direction(manifest.sun(0), manifest.sun(1), manifest.sun(2));
   if (glm::length(direction) < 1e-6f) return fail("manifest: the sun has no direction");
   background_.has_sun = true;
@@ -149,14 +156,17 @@ Result<void> SceneModel::add_chunk(const wire::GeometryChunk& info) {
   if (info.index() >= expected_chunks_) return refuse("index is out of range");
   if (chunk_seen_[info.index()]) return refuse("came twice");
   if (info.chart() >= highest_base_.size()) return refuse("names no chart");
-  if (info.vertex_count() > limits_.max_chunk_vertices || info.vertex_count() > most_vertices(info.vertices().size(), sizeof(Vertex))) {
+  if (info.vertex_count() > limits_.max_chunk_vertices ||
+      info.vertex_count() > most_vertices(info.vertices().size(), sizeof(Vertex))) {
     return refuse("too many vertices");
   }
   // The codec spends at least one byte on a triangle.
-  if (info.index_count() % 3 != 0 || info.index_count() > limits_.max_chunk_indices || info.index_count() / 3 > info.indices().size()) {
+  if (info.index_count() % 3 != 0 || info.index_count() > limits_.max_chunk_indices ||
+      info.index_count() / 3 > info.indices().size()) {
     return refuse("wrong number of indices");
   }
-  const std::uint64_t bytes = std::uint64_t{info.vertex_count()} * sizeof(Vertex) + std::uint64_t{info.index_count()} * 4;
+  const std::uint64_t bytes =
+      std::uint64_t{info.vertex_count()} * sizeof(Vertex) + std::uint64_t{info.index_count()} * 4;
   if (geometry_bytes_ + bytes > limits_.max_geometry_bytes) return refuse("geometry is over the limit");
 
   Chunk chunk;
@@ -164,11 +174,12 @@ Result<void> SceneModel::add_chunk(const wire::GeometryChunk& info) {
   chunk.index = info.index();
   chunk.vertices.resize(info.vertex_count());
   chunk.indices.resize(info.index_count());
-  if (info.vertex_count() > 0 &&
-      meshopt_decodeVertexBuffer(chunk.vertices.data(), info.vertex_count(), sizeof(Vertex), bytes_of(info.vertices()), info.vertices().size()) != 0) {
+  if (info.vertex_count() > 0 && meshopt_decodeVertexBuffer(chunk.vertices.data(), info.vertex_count(), sizeof(Vertex),
+                                                            bytes_of(info.vertices()), info.vertices().size()) != 0) {
     return refuse("vertices do not decode");
   }
-  if (info.index_count() > 0 && meshopt_decodeIndexBuffer(chunk.indices.data(), info.index_count(), 4, bytes_of(info.indices()), info.indices().size()) != 0) {
+  if (info.index_count() > 0 && meshopt_decodeIndexBuffer(chunk.indices.data(), info.index_count(), 4,
+                                                          bytes_of(info.indices()), info.indices().size()) != 0) {
     return refuse("indices do not decode");
   }
   const std::uint32_t patches_left = patch_count_ - highest_base_[info.chart()];

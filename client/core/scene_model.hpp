@@ -13,8 +13,8 @@
 
 namespace darm::client {
 
-inline constexpr std::uint32_t kTileSize = 30;   ///< payload of a tile, texels per side
-inline constexpr std::uint32_t kSlotSize = 32;   ///< payload plus a border of one texel
+inline constexpr std::uint32_t kTileSize = 30;      ///< payload of a tile, texels per side
+inline constexpr std::uint32_t kSlotSize = 32;      ///< payload plus a border of one texel
 inline constexpr std::uint32_t kTableWidth = 2048;  ///< width of every table texture
 inline constexpr std::uint32_t kMaxTableEntries = kTableWidth * 2048u;
 inline constexpr std::uint32_t kMaxLevels = 16;
@@ -131,8 +131,8 @@ class SceneModel {
   bool has_alpha_ = false;
 };
 
-/// Most elements of `stride` bytes that a meshopt vertex buffer of `bytes` can hold: each block of at most 256 spends at
-/// least 4 bytes on each byte of the stride. What claims more is refused before memory is taken.
+/// Most elements of `stride` bytes that a meshopt vertex buffer of `bytes` can hold: each block of at most 256 spends
+/// at least 4 bytes on each byte of the stride. What claims more is refused before memory is taken.
 [[nodiscard]] std::uint64_t most_vertices(std::uint64_t bytes, std::uint32_t stride);
 
 [[nodiscard]] float srgb_to_linear(float encoded);

@@ -20,14 +20,16 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
 std::optional<std::string> inflate_coverage(const std::string& packed) {
   std::string out(kSlotTexels, '\0');
   uLongf size = kSlotTexels;
-  const int code = uncompress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+  const int code = uncompress(reinterpret_cast<Bytef*>(out.data()), &size,
+                              reinterpret_cast<const Bytef*>(packed.data()), packed.size());
   if (code != Z_OK || size != kSlotTexels) return std::nullopt;
   return out;
 }
 
 }  // namespace
 
-StreamPlayer::StreamPlayer(VideoDecoder decoder, VideoDecoder still_decoder, const SceneModel& scene, const StreamShape& shape)
+StreamPlayer::StreamPlayer(VideoDecoder decoder, VideoDecoder still_decoder, const SceneModel& scene,
+                           const StreamShape& shape)
     : decoder_(std::move(decoder)),
       still_decoder_(std::move(still_decoder)),
       shape_(shape),
@@ -48,17 +50,21 @@ Result<StreamPlayer> StreamPlayer::create(const SceneModel& scene, const StreamS
   return StreamPlayer(std::move(*decoder), std::move(*still), scene, shape);
 }
 
-Result<std::vector<StreamPlayer::Edit>> StreamPlayer::read_edits(const wire::StreamFrame& frame, const SceneModel& scene) const {
+Result<std::vector<StreamPlayer::Edit>> StreamPlayer::read_edits(const wire::StreamFrame& frame,
+                                                                 const SceneModel& scene) const {
   std::vector<Edit> edits;
   edits.reserve(static_cast<std::size_t>(frame.page_edits_size()));
   for (const auto& info : frame.page_edits()) {
     Edit edit{};
-    if (!scene.page_entry(info.tile(), edit.entry)) return fail(fmt::format("frame {}: no such tile {:#x}", frame.frame(), info.tile()));
-    if (info.slot() != kAbsent && info.slot() >= shape_.slot_count()) return fail(fmt::format("frame {}: no such slot {}", frame.frame(), info.slot()));
+    if (!scene.page_entry(info.tile(), edit.entry))
+      return fail(fmt::format("frame {}: no such tile {:#x}", frame.frame(), info.tile()));
+    if (info.slot() != kAbsent && info.slot() >= shape_.slot_count())
+      return fail(fmt::format("frame {}: no such slot {}", frame.frame(), info.slot()));
     edit.slot = static_cast<std::uint16_t>(info.slot());
     if (!info.coverage().empty()) {
       auto coverage = inflate_coverage(info.coverage());
-      if (!coverage) return fail(fmt::format("frame {}: coverage of tile {:#x} is not 32x32", frame.frame(), info.tile()));
+      if (!coverage)
+        return fail(fmt::format("frame {}: coverage of tile {:#x} is not 32x32", frame.frame(), info.tile()));
       edit.coverage = std::move(*coverage);
     }
     edits.push_back(std::move(edit));
@@ -67,7 +73,8 @@ Result<std::vector<StreamPlayer::Edit>> StreamPlayer::read_edits(const wire::Str
 }
 
 Result<void> StreamPlayer::check_pixels(const wire::StreamFrame& frame) const {
-  if (frame.pixels_size() > 0 && !shape_.lossless) return fail(fmt::format("frame {}: bare pixels on a coded stream", frame.frame()));
+  if (frame.pixels_size() > 0 && !shape_.lossless)
+    return fail(fmt::format("frame {}: bare pixels on a coded stream", frame.frame()));
   for (const auto& p : frame.pixels()) {
     if (p.slot() >= shape_.slot_count() || p.rgb().size() != kSlotTexels * 3) {
       return fail(fmt::format("frame {}: slot pixels out of range", frame.frame()));
@@ -99,7 +106,8 @@ Result<FrameFate> StreamPlayer::apply(const wire::StreamFrame& frame, const Scen
       return FrameFate::kSkipped;
     }
     if (next_picture_.width != shape_.phystex_size || next_picture_.height != shape_.phystex_size) {
-      return fail(fmt::format("frame {}: picture is {}x{}, not the size agreed", frame.frame(), next_picture_.width, next_picture_.height));
+      return fail(fmt::format("frame {}: picture is {}x{}, not the size agreed", frame.frame(), next_picture_.width,
+                              next_picture_.height));
     }
     std::swap(picture_, next_picture_);
     picture_new_ = true;
@@ -130,11 +138,14 @@ void StreamPlayer::commit(const wire::StreamFrame& frame, std::vector<Edit> edit
 
 Result<void> StreamPlayer::apply(const wire::CoarseTexture& coarse, const SceneModel& scene) {
   const auto& level = scene.levels().back();
-  if (coarse.width() != level.width || coarse.height() != level.height) return fail("coarse texture: size differs from the manifest");
+  if (coarse.width() != level.width || coarse.height() != level.height)
+    return fail("coarse texture: size differs from the manifest");
   Picture picture;
   still_decoder_.reset();
-  if (auto ok = still_decoder_.decode(bytes_of(coarse.h264()), picture); !ok) return std::unexpected(Error("coarse texture: " + ok.error().message));
-  if (picture.width != level.width || picture.height != level.height) return fail("coarse texture: picture has another size");
+  if (auto ok = still_decoder_.decode(bytes_of(coarse.h264()), picture); !ok)
+    return std::unexpected(Error("coarse texture: " + ok.error().message));
+  if (picture.width != level.width || picture.height != level.height)
+    return fail("coarse texture: picture has another size");
   coarse_ = std::move(picture);
   coarse_new_ = true;
   has_coarse_ = true;

@@ -1,4 +1,5 @@
-// Turns stream messages into what is to be drawn: the page table, PhysTex and CoarseTex. Pure but for the video decoder.
+// Turns stream messages into what is to be drawn: the page table, PhysTex and CoarseTex. Pure but for the video
+// decoder.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +31,8 @@ struct StreamShape {
 
 /// What became of a StreamFrame.
 enum class FrameFate : std::uint8_t {
-  kApplied,   ///< picture and page table are now those of this frame
-  kSkipped,   ///< not applied: waiting for a key frame (ask for one while key_frame_wanted())
+  kApplied,  ///< picture and page table are now those of this frame
+  kSkipped,  ///< not applied: waiting for a key frame (ask for one while key_frame_wanted())
 };
 
 /// Keeps picture and page table of one stream in step: both of a frame, or neither (DESIGN section 4 "Frames").

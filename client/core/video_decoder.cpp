@@ -33,10 +33,12 @@ std::string av_text(int code) {
   return text;
 }
 
-void copy_plane(const AVFrame& frame, int plane, std::uint32_t width, std::uint32_t height, std::vector<std::uint8_t>& out) {
+void copy_plane(const AVFrame& frame, int plane, std::uint32_t width, std::uint32_t height,
+                std::vector<std::uint8_t>& out) {
   out.resize(std::size_t{width} * height);
   for (std::uint32_t row = 0; row < height; ++row) {
-    std::memcpy(out.data() + std::size_t{row} * width, frame.data[plane] + static_cast<std::ptrdiff_t>(row) * frame.linesize[plane], width);
+    std::memcpy(out.data() + std::size_t{row} * width,
+                frame.data[plane] + static_cast<std::ptrdiff_t>(row) * frame.linesize[plane], width);
   }
 }
 
@@ -55,7 +57,8 @@ Result<VideoDecoder> VideoDecoder::create(std::uint32_t max_width, std::uint32_t
   state->context = avcodec_alloc_context3(codec);
   state->packet = av_packet_alloc();
   state->frame = av_frame_alloc();
-  if (state->context == nullptr || state->packet == nullptr || state->frame == nullptr) return fail("H.264: out of memory");
+  if (state->context == nullptr || state->packet == nullptr || state->frame == nullptr)
+    return fail("H.264: out of memory");
   auto& c = *state->context;
   c.flags |= AV_CODEC_FLAG_LOW_DELAY;
   c.thread_count = 2;
@@ -63,7 +66,8 @@ Result<VideoDecoder> VideoDecoder::create(std::uint32_t max_width, std::uint32_t
   c.err_recognition = AV_EF_EXPLODE | AV_EF_BITSTREAM | AV_EF_BUFFER;
   // Padded to macroblocks and a margin: cropping hides the rest.
   c.max_pixels = (std::int64_t{max_width} + 64) * (std::int64_t{max_height} + 64);
-  if (const int code = avcodec_open2(state->context, codec, nullptr); code < 0) return fail("H.264: decoder does not open: " + av_text(code));
+  if (const int code = avcodec_open2(state->context, codec, nullptr); code < 0)
+    return fail("H.264: decoder does not open: " + av_text(code));
   return VideoDecoder(std::move(state));
 }
 

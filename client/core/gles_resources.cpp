@@ -1,0 +1,129 @@
+#include "client/core/gles_resources.hpp"
+
+#include <array>
+#include <cstring>
+
+namespace darm::client::gles {
+namespace {
+
+Result<GLuint> compile(GLenum stage, const std::string& source) {
+  const GLuint shader = glCreateShader(stage);
+  const char* text = source.c_str();
+  glShaderSource(shader, 1, &text, nullptr);
+  glCompileShader(shader);
+  GLint ok = GL_FALSE;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+  if (ok == GL_TRUE) return shader;
+  std::array<char, 1024> log{};
+  glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()) - 1, nullptr, log.data());
+  glDeleteShader(shader);
+  return fail(std::string("shader does not compile: ") + log.data());
+}
+
+}  // namespace
+
+template <Kind K>
+void Name<K>::reset() {
+  if (id_ == 0) return;
+  if constexpr (K == Kind::kTexture) glDeleteTextures(1, &id_);
+  if constexpr (K == Kind::kFramebuffer) glDeleteFramebuffers(1, &id_);
+  if constexpr (K == Kind::kRenderbuffer) glDeleteRenderbuffers(1, &id_);
+  if constexpr (K == Kind::kBuffer) glDeleteBuffers(1, &id_);
+  if constexpr (K == Kind::kVertexArray) glDeleteVertexArrays(1, &id_);
+  if constexpr (K == Kind::kProgram) glDeleteProgram(id_);
+  id_ = 0;
+}
+template class Name<Kind::kTexture>;
+template class Name<Kind::kFramebuffer>;
+template class Name<Kind::kRenderbuffer>;
+template class Name<Kind::kBuffer>;
+template class Name<Kind::kVertexArray>;
+template class Name<Kind::kProgram>;
+
+Texture make_texture(GLenum internal_format, std::uint32_t width, std::uint32_t height, GLint filter) {
+  GLuint id = 0;
+  glGenTextures(1, &id);
+  glBindTexture(GL_TEXTURE_2D, id);
+  glTexStorage2D(GL_TEXTURE_2D, 1, internal_format, static_cast<GLsizei>(width), static_cast<GLsizei>(height));
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  return Texture(id);
+}
+
+Buffer make_buffer(GLenum target, const void* data, std::size_t bytes) {
+  GLuint id = 0;
+  glGenBuffers(1, &id);
+  glBindBuffer(target, id);
+  glBufferData(target, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);
+  return Buffer(id);
+}
+
+VertexArray make_vertex_array() {
+  GLuint id = 0;
+  glGenVertexArrays(1, &id);
+  glBindVertexArray(id);
+  return VertexArray(id);
+}
+
+Framebuffer make_framebuffer() {
+  GLuint id = 0;
+  glGenFramebuffers(1, &id);
+  glBindFramebuffer(GL_FRAMEBUFFER, id);
+  return Framebuffer(id);
+}
+
+Renderbuffer make_renderbuffer(GLenum internal_format, std::uint32_t width, std::uint32_t height) {
+  GLuint id = 0;
+  glGenRenderbuffers(1, &id);
+  glBindRenderbuffer(GL_RENDERBUFFER, id);
+  glRenderbufferStorage(GL_RENDERBUFFER, internal_format, static_cast<GLsizei>(width), static_cast<GLsizei>(height));
+  return Renderbuffer(id);
+}
+
+Result<Program> Program::link(const std::string& vertex, const std::string& fragment) {
+  const auto v = compile(GL_VERTEX_SHADER, vertex);
+  if (!v) return std::unexpected(v.error());
+  const auto f = compile(GL_FRAGMENT_SHADER, fragment);
+  if (!f) {
+    glDeleteShader(*v);
+    return std::unexpected(f.error());
+  }
+  Program program;
+  program.name_ = Name<Kind::kProgram>(glCreateProgram());
+  const GLuint id = program.name_.id();
+  glAttachShader(id, *v);
+  glAttachShader(id, *f);
+  glLinkProgram(id);
+  glDeleteShader(*v);
+  glDeleteShader(*f);
+  GLint ok = GL_FALSE;
+  glGetProgramiv(id, GL_LINK_STATUS, &ok);
+  if (ok == GL_TRUE) return program;
+  std::array<char, 1024> log{};
+  glGetProgramInfoLog(id, static_cast<GLsizei>(log.size()) - 1, nullptr, log.data());
+  return fail(std::string("shader program does not link: ") + log.data());
+}
+
+void Program::use() const { glUseProgram(name_.id()); }
+
+GLint Program::at(const char* uniform) {
+  const auto found = places_.find(uniform);
+  if (found != places_.end()) return found->second;
+  const GLint place = glGetUniformLocation(name_.id(), uniform);
+  places_.emplace(uniform, place);
+  return place;
+}
+
+bool has_extension(const char* name) {
+  GLint count = 0;
+  glGetIntegerv(GL_NUM_EXTENSIONS, &count);
+  for (GLint i = 0; i < count; ++i) {
+    const auto* extension = reinterpret_cast<const char*>(glGetStringi(GL_EXTENSIONS, static_cast<GLuint>(i)));
+    if (extension != nullptr && std::strcmp(extension, name) == 0) return true;
+  }
+  return false;
+}
+
+}  // namespace darm::client::gles

@@ -1,0 +1,423 @@
+#include "client/core/renderer_gles.hpp"
+
+#include <EGL/egl.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <glm/vec4.hpp>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "client/core/gles_resources.hpp"
+#include "client/core/shaders.hpp"
+#include "client/core/stream_textures.hpp"
+
+namespace darm::client {
+namespace {
+
+constexpr std::uint32_t kSamplesPerAxis = 2;
+constexpr GLenum kLowerLeft = 0x8CA1;
+constexpr GLenum kZeroToOne = 0x935F;
+using ClipControl = void (*)(GLenum origin, GLenum depth);
+
+struct GpuChunk {
+  gles::VertexArray array;
+  gles::Buffer vertices, indices;
+  GLsizei index_count = 0;
+};
+
+// One chunk of one instance.
+struct Item {
+  std::uint32_t instance = 0;
+  std::uint32_t chunk = 0;
+  double distance = 0;
+};
+
+enum class Pass : std::uint8_t { kDepth, kColour, kStats };
+
+}  // namespace
+
+struct GlesRenderer::State {
+  StreamTextures textures;
+  StreamShape shape;
+  std::vector<GpuChunk> chunks;
+  std::vector<Item> opaque, blended;
+  std::map<std::uint32_t, gles::Program> surfaces;
+  std::optional<gles::Program> depth, background, background_stats, resolve;
+  gles::VertexArray empty_array;
+  gles::Framebuffer samples_target, stats_target, picture_target;
+  gles::Texture samples, stats, picture;
+  gles::Renderbuffer depth_buffer;
+  std::uint32_t width = 0, height = 0, largest = 0;
+  bool linear = false;
+  ClipControl clip_control = nullptr;
+
+  explicit State(StreamTextures t) : textures(std::move(t)) {}
+
+  Result<gles::Program*> surface(const SurfaceVariant& variant);
+  Result<void> make_targets(std::uint32_t w, std::uint32_t h);
+  Result<void> make_stats_target();
+  void add_chunk(const SceneModel& scene, std::uint32_t index);
+  void draw_background(const SceneModel& scene, const View& view, bool stats_pass);
+  Result<void> draw_items(const SceneModel& scene, const View& view, const std::vector<Item>& items, Pass pass,
+                          bool blend);
+  Result<void> draw_scene(const SceneModel& scene, const View& view, bool stats_pass);
+  void set_frame_uniforms(gles::Program& program, const SceneModel& scene) const;
+  void set_blending(const InstanceShape& instance) const;
+};
+
+namespace {
+
+bool is_blended(const InstanceShape& i) { return i.alpha_mode == AlphaMode::kBlend || i.transmission > 0; }
+
+glm::vec3 centre(const Chunk& chunk, const InstanceShape& instance) {
+  return glm::vec3(instance.to_world * glm::vec4((chunk.low + chunk.high) * 0.5f, 1.0f));
+}
+
+// True if all corners of the box are outside one plane of the view's pyramid.
+bool outside(const Chunk& chunk, const glm::dmat4& to_clip) {
+  std::array<int, 5> out{};
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec4 p =
+        to_clip * glm::dvec4((corner & 1) ? chunk.high.x : chunk.low.x, (corner & 2) ? chunk.high.y : chunk.low.y,
+                             (corner & 4) ? chunk.high.z : chunk.low.z, 1.0);
+    out[0] += p.x < -p.w;
+    out[1] += p.x > p.w;
+    out[2] += p.y < -p.w;
+    out[3] += p.y > p.w;
+    out[4] += p.w < 0;
+  }
+  return std::any_of(out.begin(), out.end(), [](int n) { return n == 8; });
+}
+
+glm::dmat4 world_to_clip(const SceneModel& scene, const View& view, bool reversed) {
+  const double diagonal = std::max(1e-3, glm::length(glm::dvec3(scene.high()) - glm::dvec3(scene.low())));
+  const glm::dvec3 eye = view.position - scene.origin();
+  const glm::dvec3 farthest =
+      glm::max(glm::abs(eye - glm::dvec3(scene.low())), glm::abs(eye - glm::dvec3(scene.high())));
+  const double near_plane = reversed ? diagonal * 1e-5 : diagonal / 5000;
+  const double far_plane = std::max(near_plane * 2, glm::length(farthest) * 1.01);
+  return projection_matrix(view, near_plane, far_plane, reversed) * view_matrix(view, scene.origin());
+}
+
+}  // namespace
+
+Result<gles::Program*> GlesRenderer::State::surface(const SurfaceVariant& variant) {
+  const auto found = surfaces.find(variant.bits());
+  if (found != surfaces.end()) return &found->second;
+  auto program = gles::Program::link(surface_vertex_source(), surface_fragment_source(variant));
+  if (!program) return std::unexpected(program.error());
+  program->use();
+  glUniform1i(program->at("u_places"), kPlacesUnit);
+  glUniform1i(program->at("u_pages"), kPagesUnit);
+  glUniform1i(program->at(variant.lossless ? "u_rgb" : "u_y"), kYUnit);
+  glUniform1i(program->at("u_cb"), kCbUnit);
+  glUniform1i(program->at("u_cr"), kCrUnit);
+  glUniform1i(program->at("u_coverage"), kCoverageUnit);
+  glUniform1i(program->at("u_coarse_y"), kCoarseYUnit);
+  glUniform1i(program->at("u_coarse_cb"), kCoarseCbUnit);
+  glUniform1i(program->at("u_coarse_cr"), kCoarseCrUnit);
+  return &surfaces.emplace(variant.bits(), std::move(*program)).first->second;
+}
+
+void GlesRenderer::State::set_frame_uniforms(gles::Program& program, const SceneModel& scene) const {
+  std::array<glm::vec4, kMaxLevels> levels{};
+  for (std::size_t i = 0; i < scene.levels().size(); ++i) {
+    const auto& l = scene.levels()[i];
+    levels[i] = {l.density, static_cast<float>(l.first_tile), static_cast<float>(l.tiles_x),
+                 static_cast<float>(l.tiles_y)};
+  }
+  glUniform4fv(program.at("u_levels"), static_cast<GLsizei>(kMaxLevels), glm::value_ptr(levels[0]));
+  glUniform1i(program.at("u_level_count"), static_cast<GLint>(scene.levels().size()));
+  glUniform1ui(program.at("u_patch_count"), scene.patch_count());
+  glUniform1f(program.at("u_q_per_pixel"), scene.q() * static_cast<float>(kSamplesPerAxis));
+  glUniform1f(program.at("u_phys_size"), static_cast<float>(shape.phystex_size));
+  glUniform1f(program.at("u_chroma_step"), textures.chroma_444() ? 1.0f : 0.5f);
+  glUniform2f(program.at("u_coarse_size"), static_cast<float>(textures.coarse_width()),
+              static_cast<float>(textures.coarse_height()));
+  const glm::vec3& sky = scene.background().horizon;
+  const float grey = linear_to_srgb(glm::clamp(0.2126f * sky.x + 0.7152f * sky.y + 0.0722f * sky.z, 0.0f, 1.0f));
+  glUniform3f(program.at("u_missing"), grey, grey, grey);
+}
+
+// Both classes let through what is behind: BLEND by its coverage, thin clear surfaces by tint times transmission.
+void GlesRenderer::State::set_blending(const InstanceShape& instance) const {
+  if (instance.transmission > 0) {
+    const glm::vec3 through = instance.tint * instance.transmission;
+    glBlendColor(through.x, through.y, through.z, 1.0f);
+    glBlendFunc(GL_ONE, GL_CONSTANT_COLOR);
+  } else {
+    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  }
+}
+
+Result<void> GlesRenderer::State::make_targets(std::uint32_t w, std::uint32_t h) {
+  if (w == width && h == height) return {};
+  const std::uint32_t sw = w * kSamplesPerAxis, sh = h * kSamplesPerAxis;
+  if (w == 0 || h == 0 || sw > largest || sh > largest)
+    return fail(fmt::format("picture of {}x{}: this GL draws at most {} on a side", w, h, largest / kSamplesPerAxis));
+  stats.reset();
+  stats_target.reset();
+  depth_buffer = gles::make_renderbuffer(GL_DEPTH_COMPONENT32F, sw, sh);
+  samples = gles::make_texture(linear ? GL_RGBA16F : GL_RGBA8, sw, sh, GL_NEAREST);
+  samples_target = gles::make_framebuffer();
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, samples.id(), 0);
+  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_buffer.id());
+  const bool samples_ok = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+  picture = gles::make_texture(GL_RGBA8, w, h, GL_NEAREST);
+  picture_target = gles::make_framebuffer();
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, picture.id(), 0);
+  if (!samples_ok || glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+    return fail("GL: no render target of this size");
+  width = w;
+  height = h;
+  return {};
+}
+
+Result<void> GlesRenderer::State::make_stats_target() {
+  if (stats_target) return {};
+  stats = gles::make_texture(GL_RGBA8, width * kSamplesPerAxis, height * kSamplesPerAxis, GL_NEAREST);
+  stats_target = gles::make_framebuffer();
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, stats.id(), 0);
+  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_buffer.id());
+  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) return fail("GL: no target for counting");
+  return {};
+}
+
+void GlesRenderer::State::add_chunk(const SceneModel& scene, std::uint32_t index) {
+  const Chunk& chunk = scene.chunks()[index];
+  GpuChunk gpu;
+  gpu.array = gles::make_vertex_array();
+  gpu.vertices = gles::make_buffer(GL_ARRAY_BUFFER, chunk.vertices.data(), chunk.vertices.size() * sizeof(Vertex));
+  gpu.indices =
+      gles::make_buffer(GL_ELEMENT_ARRAY_BUFFER, chunk.indices.data(), chunk.indices.size() * sizeof(std::uint32_t));
+  gpu.index_count = static_cast<GLsizei>(chunk.indices.size());
+  const auto at = [](std::size_t offset) { return reinterpret_cast<const void*>(offset); };
+  glEnableVertexAttribArray(0);
+  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(Vertex), at(offsetof(Vertex, position)));
+  glEnableVertexAttribArray(1);
+  glVertexAttribPointer(1, 2, GL_FLOAT, GL_FALSE, sizeof(Vertex), at(offsetof(Vertex, uv)));
+  glEnableVertexAttribArray(2);
+  glVertexAttribIPointer(2, 1, GL_UNSIGNED_INT, sizeof(Vertex), at(offsetof(Vertex, local_patch)));
+  glBindVertexArray(0);
+  chunks.push_back(std::move(gpu));
+  if (chunk.indices.empty()) return;
+  for (std::uint32_t i = 0; i < scene.instances().size(); ++i) {
+    const auto& instance = scene.instances()[i];
+    if (instance.chart == chunk.chart) (is_blended(instance) ? blended : opaque).push_back({i, index, 0});
+  }
+}
+
+void GlesRenderer::State::draw_background(const SceneModel& scene, const View& view, bool stats_pass) {
+  gles::Program& program = stats_pass ? *background_stats : *background;
+  program.use();
+  const double half = std::tan(view.fovy * 0.5);
+  const glm::dmat3 axes = glm::mat3_cast(view.orientation);
+  const glm::vec3 right(axes[0] * (half * view.width / view.height)), up(axes[1] * half), forward(-axes[2]);
+  const Background& b = scene.background();
+  glUniform3fv(program.at("u_right"), 1, glm::value_ptr(right));
+  glUniform3fv(program.at("u_up"), 1, glm::value_ptr(up));
+  glUniform3fv(program.at("u_forward"), 1, glm::value_ptr(forward));
+  glUniform3fv(program.at("u_zenith"), 1, glm::value_ptr(b.zenith));
+  glUniform3fv(program.at("u_horizon"), 1, glm::value_ptr(b.horizon));
+  glUniform3fv(program.at("u_ground"), 1, glm::value_ptr(b.ground));
+  glUniform4f(program.at("u_sun"), b.sun_direction.x, b.sun_direction.y, b.sun_direction.z,
+              b.has_sun ? b.sun_cos : 2.0f);
+  glUniform3fv(program.at("u_sun_rgb"), 1, glm::value_ptr(b.sun_rgb));
+  glDisable(GL_DEPTH_TEST);
+  glBindVertexArray(empty_array.id());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+}
+
+Result<void> GlesRenderer::State::draw_items(const SceneModel& scene, const View& view, const std::vector<Item>& items,
+                                             Pass pass, bool blend) {
+  const glm::dmat4 to_clip = world_to_clip(scene, view, clip_control != nullptr);
+  gles::Program* current = nullptr;
+  for (const Item& item : items) {
+    const auto& instance = scene.instances()[item.instance];
+    const bool mask = instance.alpha_mode == AlphaMode::kMask;
+    if (pass == Pass::kDepth && mask) continue;
+    const glm::dmat4 matrix = to_clip * glm::dmat4(instance.to_world);
+    if (outside(scene.chunks()[item.chunk], matrix)) continue;
+    gles::Program* program = &*depth;
+    if (pass != Pass::kDepth) {
+      const SurfaceVariant variant{shape.lossless, mask, blend && instance.alpha_mode == AlphaMode::kBlend, linear,
+                                   pass == Pass::kStats};
+      auto found = surface(variant);
+      if (!found) return std::unexpected(found.error());
+      program = *found;
+    }
+    if (program != current) {
+      program->use();
+      if (pass != Pass::kDepth) set_frame_uniforms(*program, scene);
+      current = program;
+    }
+    const glm::mat4 matrix_f(matrix);
+    glUniformMatrix4fv(program->at("u_to_clip"), 1, GL_FALSE, glm::value_ptr(matrix_f));
+    if (pass != Pass::kDepth) {
+      glUniform1ui(program->at("u_front_base"), instance.front_base);
+      glUniform1ui(program->at("u_back_base"), instance.back_base);
+      glUniform1f(program->at("u_cutoff"), instance.alpha_cutoff);
+    }
+    if (blend) set_blending(instance);
+    glFrontFace(instance.flipped ? GL_CW : GL_CCW);  // makes gl_FrontFacing the scene's front
+    if (instance.camera_sees_back) {
+      glDisable(GL_CULL_FACE);
+    } else {
+      glEnable(GL_CULL_FACE);
+    }
+    const GpuChunk& gpu = chunks[item.chunk];
+    glBindVertexArray(gpu.array.id());
+    glDrawElements(GL_TRIANGLES, gpu.index_count, GL_UNSIGNED_INT, nullptr);
+  }
+  return {};
+}
+
+Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View& view, bool stats_pass) {
+  glBindFramebuffer(GL_FRAMEBUFFER, stats_pass ? stats_target.id() : samples_target.id());
+  glViewport(0, 0, static_cast<GLsizei>(width * kSamplesPerAxis), static_cast<GLsizei>(height * kSamplesPerAxis));
+  const bool reversed = clip_control != nullptr;
+  if (reversed) clip_control(kLowerLeft, kZeroToOne);
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+  glDepthMask(GL_TRUE);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glClearDepthf(reversed ? 0.0f : 1.0f);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  draw_background(scene, view, stats_pass);
+  textures.bind();
+  const auto eye = glm::vec3(view.position - scene.origin());
+  for (auto* items : {&opaque, &blended}) {
+    for (Item& item : *items)
+      item.distance = glm::length(centre(scene.chunks()[item.chunk], scene.instances()[item.instance]) - eye);
+  }
+  std::stable_sort(opaque.begin(), opaque.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
+  std::stable_sort(blended.begin(), blended.end(),
+                   [](const Item& a, const Item& b) { return a.distance > b.distance; });
+  glDepthFunc(reversed ? GL_GEQUAL : GL_LEQUAL);
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  Result<void> ok = draw_items(scene, view, opaque, Pass::kDepth, false);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  const Pass pass = stats_pass ? Pass::kStats : Pass::kColour;
+  if (ok) ok = draw_items(scene, view, opaque, pass, false);
+  glDepthMask(GL_FALSE);
+  if (!stats_pass) glEnable(GL_BLEND);
+  if (ok) ok = draw_items(scene, view, blended, pass, true);
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+  glDepthMask(GL_TRUE);
+  glBindVertexArray(0);
+  return ok;
+}
+
+GlesRenderer::GlesRenderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+GlesRenderer::~GlesRenderer() = default;
+
+Result<std::unique_ptr<GlesRenderer>> GlesRenderer::create(const SceneModel& scene, const StreamShape& shape) {
+  auto textures = StreamTextures::create(scene, shape);
+  if (!textures) return std::unexpected(textures.error());
+  auto state = std::make_unique<State>(std::move(*textures));
+  State& s = *state;
+  s.shape = shape;
+  GLint largest = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
+  s.largest = static_cast<std::uint32_t>(largest);
+  s.linear = gles::has_extension("GL_EXT_color_buffer_float") || gles::has_extension("GL_EXT_color_buffer_half_float");
+  if (gles::has_extension("GL_EXT_clip_control"))
+    s.clip_control = reinterpret_cast<ClipControl>(eglGetProcAddress("glClipControlEXT"));
+  s.empty_array = gles::make_vertex_array();
+  const struct {
+    std::optional<gles::Program>& program;
+    std::string vertex, fragment;
+  } sources[] = {{s.depth, surface_vertex_source(), depth_fragment_source()},
+                 {s.background, fullscreen_vertex_source(), background_fragment_source(s.linear, false)},
+                 {s.background_stats, fullscreen_vertex_source(), background_fragment_source(s.linear, true)},
+                 {s.resolve, fullscreen_vertex_source(), resolve_fragment_source(s.linear)}};
+  for (const auto& source : sources) {
+    auto program = gles::Program::link(source.vertex, source.fragment);
+    if (!program) return std::unexpected(program.error());
+    source.program.emplace(std::move(*program));
+  }
+  return std::unique_ptr<GlesRenderer>(new GlesRenderer(std::move(state)));
+}
+
+Result<void> GlesRenderer::synchronise(const SceneModel& scene, StreamPlayer& player) {
+  for (auto i = static_cast<std::uint32_t>(state_->chunks.size()); i < scene.chunks().size(); ++i)
+    state_->add_chunk(scene, i);
+  return state_->textures.upload(player);
+}
+
+Result<void> GlesRenderer::draw(const SceneModel& scene, const View& view) {
+  State& s = *state_;
+  if (auto ok = s.make_targets(view.width, view.height); !ok) return ok;
+  if (auto ok = s.draw_scene(scene, view, false); !ok) return ok;
+  glBindFramebuffer(GL_FRAMEBUFFER, s.picture_target.id());
+  glViewport(0, 0, static_cast<GLsizei>(s.width), static_cast<GLsizei>(s.height));
+  glDisable(GL_DEPTH_TEST);
+  s.resolve->use();
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, s.samples.id());
+  glUniform1i(s.resolve->at("u_samples"), 0);
+  glBindVertexArray(s.empty_array.id());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glBindVertexArray(0);
+  if (const GLenum code = glGetError(); code != GL_NO_ERROR)
+    return fail(fmt::format("GL: drawing failed with {:#x}", code));
+  return {};
+}
+
+void GlesRenderer::present(std::uint32_t framebuffer) {
+  const auto w = static_cast<GLint>(state_->width), h = static_cast<GLint>(state_->height);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->picture_target.id());
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
+  glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+}
+
+Result<Image8> GlesRenderer::read_picture() {
+  const State& s = *state_;
+  if (s.width == 0) return fail("picture: nothing is drawn yet");
+  std::vector<std::uint8_t> rgba(std::size_t{s.width} * s.height * 4);
+  glBindFramebuffer(GL_FRAMEBUFFER, s.picture_target.id());
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, static_cast<GLsizei>(s.width), static_cast<GLsizei>(s.height), GL_RGBA, GL_UNSIGNED_BYTE,
+               rgba.data());
+  Image8 image{s.width, s.height, std::vector<std::uint8_t>(std::size_t{s.width} * s.height * 3)};
+  for (std::uint32_t y = 0; y < s.height; ++y) {
+    const std::uint8_t* from = rgba.data() + std::size_t{s.height - 1 - y} * s.width * 4;
+    std::uint8_t* to = image.rgb.data() + std::size_t{y} * s.width * 3;
+    for (std::uint32_t x = 0; x < s.width; ++x) std::memcpy(to + x * 3, from + x * 4, 3);
+  }
+  return image;
+}
+
+Result<ResidencyCounts> GlesRenderer::count_residency(const SceneModel& scene, const View& view) {
+  State& s = *state_;
+  if (auto ok = s.make_targets(view.width, view.height); !ok) return std::unexpected(ok.error());
+  if (auto ok = s.make_stats_target(); !ok) return std::unexpected(ok.error());
+  if (auto ok = s.draw_scene(scene, view, true); !ok) return std::unexpected(ok.error());
+  const std::uint32_t sw = s.width * kSamplesPerAxis, sh = s.height * kSamplesPerAxis;
+  std::vector<std::uint8_t> rgba(std::size_t{sw} * sh * 4);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, static_cast<GLsizei>(sw), static_cast<GLsizei>(sh), GL_RGBA, GL_UNSIGNED_BYTE, rgba.data());
+  std::array<std::uint64_t, 9> counts{};
+  for (std::size_t i = 0; i < rgba.size(); i += 4) ++counts[static_cast<std::size_t>((rgba[i] * 8 + 127) / 255)];
+  return ResidencyCounts{std::uint64_t{sw} * sh, counts[0], counts[1], counts[2], counts[3], counts[4]};
+}
+
+void GlesRenderer::finish() { glFinish(); }
+
+std::string GlesRenderer::device() const {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name != nullptr ? name : "unknown";
+}
+
+}  // namespace darm::client

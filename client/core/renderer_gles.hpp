@@ -1,0 +1,55 @@
+// Draws the scene from PhysTex, the page table and CoarseTex with OpenGL ES 3 (paper 3.5, levels as DESIGN section 4).
+#pragma once
+
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <memory>
+#include <string>
+
+#include "client/core/picture_files.hpp"
+#include "client/core/result.hpp"
+#include "client/core/scene_model.hpp"
+#include "client/core/stream_player.hpp"
+#include "client/core/view.hpp"
+
+namespace darm::client {
+
+/// Where the samples of a picture (4 a pixel) took their light from.
+struct ResidencyCounts {
+  std::uint64_t samples = 0;
+  std::uint64_t undefined = 0;   ///< no light yet
+  std::uint64_t sharp = 0;       ///< the level the sample asked for
+  std::uint64_t coarser = 0;     ///< one to three levels coarser
+  std::uint64_t coarse_tex = 0;  ///< CoarseTex, though a finer level was asked for
+  std::uint64_t background = 0;
+};
+
+/// One scene and one stream in one GL context, which must be current at every call, destruction included.
+/// Unlit triangles, 2x2 samples a pixel, resolved in linear light. Where half-float targets exist, blending is in
+/// linear light too, else on sRGB values.
+class GlesRenderer {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<GlesRenderer>> create(const SceneModel& scene, const StreamShape& shape);
+  ~GlesRenderer();
+
+  /// Uploads what came since the last call: chunks, slots, pages, CoarseTex. The scene is that of create().
+  [[nodiscard]] Result<void> synchronise(const SceneModel& scene, StreamPlayer& player);
+  /// Draws into a picture of view.width x view.height for read_picture() and present().
+  [[nodiscard]] Result<void> draw(const SceneModel& scene, const View& view);
+  /// Copies the last picture to a framebuffer (0: the window's) of at least its size.
+  void present(std::uint32_t framebuffer);
+  [[nodiscard]] Result<Image8> read_picture();
+  /// Draws the view once more to count classes; expensive, for reports.
+  [[nodiscard]] Result<ResidencyCounts> count_residency(const SceneModel& scene, const View& view);
+  /// Waits until the GL has drawn everything (for timing).
+  void finish();
+  /// The GL's own name, for reports.
+  [[nodiscard]] std::string device() const;
+
+ private:
+  struct State;
+  explicit GlesRenderer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace darm::client
