@@ -56,7 +56,8 @@ struct KeyFrameWanted {
   [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
 };
 
-/// A tile has a new picture. `error` is its estimated RMS display error (0..1), `samples` the mean samples per seen texel.
+/// A tile has a new picture. `error` is its estimated RMS display error (0..1), `samples` the mean samples per seen
+/// texel.
 struct ShadedTile {
   TileId tile;
   std::uint32_t version = 0;
@@ -92,7 +93,7 @@ struct Tick {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
 };
 
-using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, FrameDone,
-                           ViewTraced, Tick>;
+using Inbox =
+    std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, FrameDone, ViewTraced, Tick>;
 
 }  // namespace darm::tile_scheduler

@@ -1,0 +1,47 @@
+// What one picture sample can be drawn from: its tile at the sharp level and at up to three coarser ones.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "actors/tile_scheduler/dense_index.hpp"
+#include "actors/types/tile_id.hpp"
+
+namespace darm::tile_scheduler {
+
+/// No tile: past the coarsest level. No real tile has this id (level 15 holds fewer than 2^28 - 1 tiles).
+inline constexpr TileId kNoTile{0xffffffffu};
+inline constexpr int kChainLength = kMaxCoarserLevels + 1;
+/// Position "served by CoarseTex" in place of 0..3.
+inline constexpr int kServedByCoarse = kChainLength;
+
+/// tiles[0] is at the sharp level, tiles[i] at i levels coarser; kNoTile past the coarsest level.
+struct Chain {
+  std::array<TileId, kChainLength> tiles{kNoTile, kNoTile, kNoTile, kNoTile};
+  bool operator==(const Chain&) const = default;
+  [[nodiscard]] int sharp_level() const { return tiles[0].level(); }
+};
+
+/// A chain and the share of a view's samples that use it, 0..1.
+struct WeightedChain {
+  Chain chain;
+  float weight = 0;
+};
+
+struct TileHash {
+  std::size_t operator()(TileId id) const { return MixHash::mix(id.packed); }
+};
+struct ChainHash {
+  std::size_t operator()(const Chain& c) const {
+    const auto pair = [&](int i) {
+      return (static_cast<std::uint64_t>(c.tiles[static_cast<std::size_t>(i)].packed) << 32) |
+             c.tiles[static_cast<std::size_t>(i + 1)].packed;
+    };
+    return MixHash::mix(pair(0) * 0x9e3779b97f4a7c15ull ^ MixHash::mix(pair(2)));
+  }
+};
+
+using TileIndex = DenseIndex<TileId, TileHash>;
+using ChainIndex = DenseIndex<Chain, ChainHash>;
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,233 @@
+#include "actors/tile_scheduler/slot_allocation.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <queue>
+
+namespace darm::tile_scheduler {
+namespace {
+
+constexpr std::uint32_t kNone = TileIndex::kAbsent;
+constexpr int kRounds = 4;
+
+// The request with tiles as dense numbers, and per tile the chains it can serve.
+class Problem {
+ public:
+  Problem(const AllocationRequest& request, const AllocationOptions& options) : request_(request), options_(options) {
+    tiles_.reserve(request.chains.size());
+    links_.resize(request.chains.size());
+    loss_.resize(request.chains.size());
+    for (std::size_t c = 0; c < request.chains.size(); ++c) read_chain(c);
+    make_entries();
+    resident_.assign(tiles_.size(), false);
+    for (const auto tile : request.residents)
+      if (const auto number = tiles_.find(tile); number != kNone) resident_[number] = true;
+  }
+
+  /// Tiles that are some chain's finest.
+  [[nodiscard]] std::vector<std::uint32_t> finest() const {
+    std::vector<std::uint32_t> out;
+    std::vector<bool> taken(tiles_.size(), false);
+    for (const auto& links : links_)
+      for (const auto tile : links) {
+        if (tile == kNone) continue;
+        if (!taken[tile]) out.push_back(tile);
+        taken[tile] = true;
+        break;
+      }
+    return out;
+  }
+
+  /// Residents that serve some chain when only residents are there.
+  [[nodiscard]] std::vector<std::uint32_t> useful_residents() const {
+    std::vector<std::uint32_t> out;
+    std::vector<bool> taken(tiles_.size(), false);
+    for (const auto& links : links_)
+      for (const auto tile : links) {
+        if (tile == kNone || !resident_[tile]) continue;
+        if (!taken[tile]) out.push_back(tile);
+        taken[tile] = true;
+        break;
+      }
+    return out;
+  }
+
+  /// Adds tiles to `chosen` by falling gain until the slots are full or nothing gains.
+  void fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const;
+  /// Takes out tiles whose every sample has found a finer one among `chosen`. True if there were any.
+  bool prune(std::vector<std::uint32_t>& chosen) const;
+  /// Fills, and fills again where pruning gave slots back: coarse tiles come first and are often outdone by finer ones.
+  void complete(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
+    for (int round = 0; round < kRounds; ++round) {
+      fill(chosen, with_bonus);
+      if (!prune(chosen)) return;
+    }
+  }
+  [[nodiscard]] Allocation result(std::vector<std::uint32_t> chosen) const;
+
+ private:
+  using Losses = std::array<float, kChainLength + 1>;
+  struct Entry {
+    std::uint32_t chain;
+    std::uint32_t position;
+  };
+
+  void read_chain(std::size_t c) {
+    const auto& chain = request_.chains[c].chain;
+    for (std::size_t i = 0; i < chain.tiles.size(); ++i) {
+      links_[c][i] = kNone;
+      if (chain.tiles[i] == kNoTile) continue;
+      const auto number = tiles_.insert(chain.tiles[i]);
+      if (number == allowed_.size()) allowed_.push_back(!request_.available || request_.available(chain.tiles[i]));
+      if (allowed_[number]) links_[c][i] = number;
+    }
+    for (int i = 0; i <= kChainLength; ++i)
+      loss_[c][static_cast<std::size_t>(i)] = serving_loss(chain, i, request_.coarse_level, options_);
+  }
+
+  void make_entries() {
+    first_.assign(tiles_.size() + 1, 0);
+    for (const auto& links : links_)
+      for (const auto tile : links)
+        if (tile != kNone) ++first_[tile + 1];
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    entries_.resize(first_.back());
+    auto next = first_;
+    for (std::size_t c = 0; c < links_.size(); ++c)
+      for (std::size_t i = 0; i < links_[c].size(); ++i)
+        if (links_[c][i] != kNone)
+          entries_[next[links_[c][i]]++] = {static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i)};
+  }
+
+  [[nodiscard]] double gain(std::uint32_t tile, const std::vector<float>& best) const {
+    double sum = 0;
+    for (auto e = first_[tile]; e < first_[tile + 1]; ++e) {
+      const auto& entry = entries_[e];
+      const float better = best[entry.chain] - loss_[entry.chain][entry.position];
+      if (better > 0) sum += double(request_.chains[entry.chain].weight) * better;
+    }
+    return sum;
+  }
+  void take(std::uint32_t tile, std::vector<float>& best) const {
+    for (auto e = first_[tile]; e < first_[tile + 1]; ++e) {
+      const auto& entry = entries_[e];
+      best[entry.chain] = std::min(best[entry.chain], loss_[entry.chain][entry.position]);
+    }
+  }
+
+  const AllocationRequest& request_;
+  const AllocationOptions& options_;
+  TileIndex tiles_;
+  std::vector<bool> allowed_;
+  std::vector<bool> resident_;
+  std::vector<std::array<std::uint32_t, kChainLength>> links_;  // per chain: allowed tiles, else kNone
+  std::vector<Losses> loss_;
+  std::vector<std::uint32_t> first_;  // per tile: its entries
+  std::vector<Entry> entries_;
+};
+
+void Problem::fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
+  struct Candidate {
+    double gain;
+    std::uint32_t tile;
+  };
+  const auto worse = [this](const Candidate& a, const Candidate& b) {
+    if (a.gain != b.gain) return a.gain < b.gain;
+    return tiles_.keys()[a.tile] >
+           tiles_.keys()[b.tile];  // ties by tile id: the same answer whatever the order of chains
+  };
+  std::vector<float> best(links_.size());
+  for (std::size_t c = 0; c < best.size(); ++c) best[c] = loss_[c][kServedByCoarse];
+  std::vector<bool> taken(tiles_.size(), false);
+  for (const auto tile : chosen) {
+    take(tile, best);
+    taken[tile] = true;
+  }
+  const auto value = [&](std::uint32_t tile) {
+    return gain(tile, best) * (with_bonus && resident_[tile] ? 1.0 + double(options_.resident_bonus) : 1.0);
+  };
+  std::vector<Candidate> initial;
+  initial.reserve(tiles_.size());
+  for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile)
+    if (!taken[tile])
+      if (const double v = value(tile); v > 0) initial.push_back({v, tile});
+  std::priority_queue queue(worse, std::move(initial));
+  while (chosen.size() < request_.slots && !queue.empty()) {
+    auto top = queue.top();
+    queue.pop();
+    top.gain = value(top.tile);  // gains only fall (submodular): a fresh one that still leads is the largest
+    if (top.gain <= 0) continue;
+    if (!queue.empty() && worse(top, queue.top())) {
+      queue.push(top);
+      continue;
+    }
+    chosen.push_back(top.tile);
+    take(top.tile, best);
+  }
+}
+
+bool Problem::prune(std::vector<std::uint32_t>& chosen) const {
+  std::vector<bool> taken(tiles_.size(), false);
+  std::vector<bool> serves(tiles_.size(), false);
+  for (const auto tile : chosen) taken[tile] = true;
+  for (const auto& links : links_)
+    for (const auto tile : links)
+      if (tile != kNone && taken[tile]) {
+        serves[tile] = true;
+        break;
+      }
+  return std::erase_if(chosen, [&](std::uint32_t tile) { return !serves[tile]; }) > 0;
+}
+
+Allocation Problem::result(std::vector<std::uint32_t> chosen) const {
+  std::vector<bool> taken(tiles_.size(), false);
+  for (const auto tile : chosen) taken[tile] = true;
+  Allocation out;
+  out.served.resize(links_.size());
+  std::vector<float> weight(tiles_.size(), 0.0f);
+  for (std::size_t c = 0; c < links_.size(); ++c) {
+    std::size_t position = 0;
+    while (position < kChainLength && (links_[c][position] == kNone || !taken[links_[c][position]])) ++position;
+    const float w = request_.chains[c].weight;
+    if (position < kChainLength) weight[links_[c][position]] += w;
+    out.served[c] = static_cast<std::uint8_t>(position);
+    out.benefit += double(w) * (loss_[c][kServedByCoarse] - loss_[c][position]);
+  }
+  std::erase_if(chosen, [&](std::uint32_t tile) { return weight[tile] <= 0; });
+  std::sort(chosen.begin(), chosen.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return weight[a] != weight[b] ? weight[a] > weight[b] : tiles_.keys()[a] < tiles_.keys()[b];
+  });
+  for (const auto tile : chosen) {
+    out.tiles.push_back(tiles_.keys()[tile]);
+    out.weights.push_back(weight[tile]);
+  }
+  return out;
+}
+
+}  // namespace
+
+float serving_loss(const Chain& chain, int position, int coarse_level, const AllocationOptions& options) {
+  if (position < kChainLength) return options.loss[static_cast<std::size_t>(position)];
+  const int distance = std::max(0, coarse_level - chain.sharp_level());
+  const int known = std::min(distance, kMaxCoarserLevels);
+  return options.loss[static_cast<std::size_t>(known)] + options.coarse_penalty +
+         static_cast<float>(distance - known) * options.loss_per_further_level;
+}
+
+Allocation allocate_slots(const AllocationRequest& request, const AllocationOptions& options) {
+  const Problem problem(request, options);
+  if (auto all = problem.finest(); all.size() <= request.slots) return problem.result(std::move(all));
+  std::vector<std::uint32_t> fresh;
+  problem.complete(fresh, true);
+  auto best = problem.result(std::move(fresh));
+  // Greedy picks near the cut-off depend on small changes of weight. What is there stays unless that costs something.
+  auto kept = problem.useful_residents();
+  if (!kept.empty() && kept.size() <= request.slots) {
+    problem.complete(kept, false);
+    auto stay = problem.result(std::move(kept));
+    if (stay.benefit >= best.benefit * (1.0 - double(options.least_improvement))) return stay;
+  }
+  return best;
+}
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,47 @@
+// Which tiles get the slots of a PhysTex: those that bring most accuracy on screen. Pure functions.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "actors/tile_scheduler/chain.hpp"
+
+namespace darm::tile_scheduler {
+
+struct AllocationOptions {
+  /// Loss of a sample drawn i levels coarser than sharp. Rises faster than linearly, so that levels coarsen evenly.
+  std::array<float, 4> loss{0.0f, 1.0f, 2.2f, 3.5f};
+  float loss_per_further_level = 1.4f;  ///< for CoarseTex, when it is more than three levels coarser
+  float coarse_penalty = 0.5f;          ///< CoarseTex is also the least well lit: it loses this much more
+  float resident_bonus = 0.15f;         ///< a resident tile's gain counts for this much more
+  float least_improvement = 0.01f;      ///< residents stay if that costs at most this share of the total benefit
+};
+
+struct AllocationRequest {
+  std::span<const WeightedChain> chains;  ///< distinct chains, weights >= 0
+  std::span<const TileId> residents;      ///< distinct tiles
+  std::function<bool(TileId)> available;  ///< tiles that may be granted; null: all
+  std::size_t slots = 0;
+  int coarse_level = 0;  ///< Layout::coarse_level()
+};
+
+/// The tiles to hold and what they serve.
+struct Allocation {
+  std::vector<TileId> tiles;         ///< at most `slots`, each serving some chain, by falling served weight
+  std::vector<float> weights;        ///< parallel to `tiles`: weight of the chains it serves
+  std::vector<std::uint8_t> served;  ///< per chain: position 0..3 of its finest tile granted, else kServedByCoarse
+  double benefit = 0;                ///< sum over chains of weight * (loss by CoarseTex - loss as served)
+};
+
+/// Maximises the benefit under the slot limit. If every chain's finest available tile fits, that is the answer
+/// (optimal); else lazy greedy (Minoux 1978) on the facility-location gain, at least 1 - 1/e of the optimum but for the
+/// residents' bonus. Deterministic. O(entries log entries) with few recomputations in practice.
+[[nodiscard]] Allocation allocate_slots(const AllocationRequest& request, const AllocationOptions& options = {});
+
+/// Loss of a chain served at `position` (0..3 or kServedByCoarse).
+[[nodiscard]] float serving_loss(const Chain& chain, int position, int coarse_level, const AllocationOptions& options);
+
+}  // namespace darm::tile_scheduler

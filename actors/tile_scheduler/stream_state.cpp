@@ -1,0 +1,128 @@
+#include "actors/tile_scheduler/stream_state.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace darm::tile_scheduler {
+
+std::size_t slot_count(const StreamFormat& format) {
+  const std::size_t side = format.phystex_size / kSlotSize;
+  return std::clamp<std::size_t>(side * side, 1, kNoSlot);
+}
+
+StreamState::StreamState(const StreamFormat& format, StreamOptions options)
+    : options_(options), table_(slot_count(format)), sent_(table_.capacity()) {
+  options_.max_writes = std::max<std::size_t>(1, options_.max_writes);
+}
+
+void StreamState::view_ready(const ViewAnswer& answer) {
+  auto& mine = answers_[answer.session];
+  if (answer.sequence >= mine.sequence) mine = answer;
+}
+
+void StreamState::forget_session(SessionId session) {
+  answers_.erase(session);
+  std::erase_if(answers_in_flight_, [&](const ViewAnswer& a) { return a.session == session; });
+}
+
+StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& images, float error, Microseconds now) {
+  StreamStep out;
+  if (in_flight() && now - sent_at_ >= options_.lost_after) frame_done(in_flight_, false);
+  if (in_flight()) return out;
+  encoder::ComposeFrame frame(last_frame_ + 1, key_pending_);
+  wanted = wanted.first(std::min(wanted.size(), table_.capacity()));
+  table_.begin_frame(frame.frame, wanted);
+  enter_new(frame, wanted, images);
+  if (key_pending_)
+    write_all(frame, images);
+  else
+    refine(frame, wanted, images);
+  for (const auto& edit : key_pending_ ? table_.whole() : table_.take_edits()) frame.edits.push_back(edit_of(edit));
+  if (key_pending_) static_cast<void>(table_.take_edits());
+
+  std::vector<ViewAnswer> answers;
+  for (auto& [session, answer] : answers_) answers.push_back(answer);
+  answers_.clear();
+  if (!frame.key && frame.writes.empty() && frame.edits.empty()) {
+    out.no_change = std::move(answers);
+    return out;
+  }
+  for (auto& answer : answers) answer.stamps.composed = now;
+  frame.answers = answers;
+  frame.error = error;
+  answers_in_flight_ = std::move(answers);
+  last_frame_ = in_flight_ = frame.frame;
+  sent_at_ = now;
+  key_pending_ = false;
+  out.frame = std::move(frame);
+  return out;
+}
+
+void StreamState::frame_done(FrameNumber number, bool ok) {
+  if (number != in_flight_ || number == 0) return;  // a frame given up for lost, reported late
+  in_flight_ = 0;
+  auto answers = std::exchange(answers_in_flight_, {});
+  if (ok) return;
+  key_pending_ = true;
+  for (const auto& answer : answers) {
+    const auto it = answers_.find(answer.session);
+    if (it == answers_.end()) answers_.emplace(answer.session, answer);
+  }
+}
+
+void StreamState::write_slot(encoder::ComposeFrame& frame, SlotIndex slot, const StoredImage& image) {
+  encoder::SlotWrite write;
+  write.slot = slot;
+  write.image = image.image;
+  frame.writes.push_back(std::move(write));
+  sent_[slot] = {image.version, image.image};
+}
+
+void StreamState::enter_new(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images) {
+  for (const auto tile : wanted) {
+    if (frame.writes.size() >= options_.max_writes) return;
+    if (table_.slot_of(tile) != kNoSlot) continue;
+    const auto* image = images(tile);
+    if (image == nullptr || image->image == nullptr) continue;
+    const auto slot = table_.insert(tile);
+    if (slot == kNoSlot) return;
+    write_slot(frame, slot, *image);
+  }
+}
+
+void StreamState::refine(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images) {
+  for (const auto tile : wanted) {
+    if (frame.writes.size() >= options_.max_writes) return;
+    const auto slot = table_.slot_of(tile);
+    if (slot == kNoSlot) continue;
+    const auto* image = images(tile);
+    if (image != nullptr && image->image != nullptr && image->version != sent_[slot].version)
+      write_slot(frame, slot, *image);
+  }
+}
+
+void StreamState::write_all(encoder::ComposeFrame& frame, const ImageLookup& images) {
+  frame.writes.clear();
+  for (const auto& entry : table_.whole()) {
+    const auto* newest = images(entry.tile);
+    if (newest != nullptr && newest->image != nullptr) {
+      write_slot(frame, entry.slot, *newest);
+      continue;
+    }
+    // Forgotten by the image store since: what was sent last is still right.
+    encoder::SlotWrite write;
+    write.slot = entry.slot;
+    write.image = sent_[entry.slot].image;
+    frame.writes.push_back(std::move(write));
+  }
+}
+
+encoder::PageEdit StreamState::edit_of(const TableEdit& edit) const {
+  encoder::PageEdit out;
+  out.tile = edit.tile;
+  out.slot = edit.slot;
+  if (edit.slot != kNoSlot) out.coverage = sent_[edit.slot].image->coverage;
+  return out;
+}
+
+}  // namespace darm::tile_scheduler

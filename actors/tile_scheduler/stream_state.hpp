@@ -1,0 +1,87 @@
+// One video stream as the scheduler knows it: its slots, what was sent of them, and what the next frame holds. Pure.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "actors/encoder/encoder_messages.hpp"
+#include "actors/tile_scheduler/page_table.hpp"
+#include "actors/tile_scheduler/tile_scheduler_messages.hpp"
+#include "actors/types/frame_stamps.hpp"
+#include "actors/types/tile_image.hpp"
+
+namespace darm::tile_scheduler {
+
+/// Newest picture of a tile.
+struct StoredImage {
+  std::uint32_t version = 0;
+  float error = 0;
+  std::shared_ptr<const TileImage> image;
+};
+/// Null: the tile has no picture yet. The pointer is used before the next call only.
+using ImageLookup = std::function<const StoredImage*(TileId)>;
+
+struct StreamOptions {
+  std::size_t max_writes = 2048;        ///< slots written per frame, key frames excepted; at least 1
+  Microseconds lost_after = 2'000'000;  ///< a frame not reported done after this counts as failed
+};
+
+/// Slots of a PhysTex; at most 65535, because slots are named by 16 bits and one value means none.
+[[nodiscard]] std::size_t slot_count(const StreamFormat& format);
+
+/// What to do now for a stream.
+struct StreamStep {
+  std::optional<encoder::ComposeFrame> frame;  ///< to the encoder
+  std::vector<ViewAnswer> no_change;           ///< to these sessions: looked at, nothing to send
+};
+
+class StreamState {
+ public:
+  StreamState(const StreamFormat& format, StreamOptions options);
+
+  void want_key() { key_pending_ = true; }
+  /// The working set now includes this view; the next frame or NoChange answers it (once).
+  void view_ready(const ViewAnswer& answer);
+  void forget_session(SessionId session);
+
+  /// Decides on the next frame. `wanted`: tiles the sessions should have, most important first, at most as many as
+  /// slots; only those with an image enter. Nothing happens while a frame is in flight.
+  [[nodiscard]] StreamStep step(std::span<const TileId> wanted, const ImageLookup& images, float error,
+                                Microseconds now);
+  /// The encoder is done with frame `number`. A failed frame makes the next one a key frame and is answered again.
+  void frame_done(FrameNumber number, bool ok);
+
+  [[nodiscard]] const PageTable& table() const { return table_; }
+  [[nodiscard]] bool in_flight() const { return in_flight_ != 0; }
+  [[nodiscard]] bool has_answers() const { return !answers_.empty(); }
+  [[nodiscard]] FrameNumber last_frame() const { return last_frame_; }
+
+ private:
+  void write_slot(encoder::ComposeFrame& frame, SlotIndex slot, const StoredImage& image);
+  void enter_new(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images);
+  void refine(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images);
+  void write_all(encoder::ComposeFrame& frame, const ImageLookup& images);
+  [[nodiscard]] encoder::PageEdit edit_of(const TableEdit& edit) const;
+
+  struct Sent {
+    std::uint32_t version = 0;
+    std::shared_ptr<const TileImage> image;  // kept: a key frame must be able to repeat it
+  };
+
+  StreamOptions options_;
+  PageTable table_;
+  std::vector<Sent> sent_;  // per slot
+  std::map<SessionId, ViewAnswer> answers_;
+  std::vector<ViewAnswer> answers_in_flight_;
+  FrameNumber last_frame_ = 0;
+  FrameNumber in_flight_ = 0;  // 0: none
+  Microseconds sent_at_ = 0;
+  bool key_pending_ = true;
+};
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,42 @@
+// Which tiles and texels a camera sees: passes of interleaved rays, gathered into a VisibleSet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+
+#include "actors/tile_scheduler/view_sampler.hpp"
+#include "actors/tile_scheduler/visible_set.hpp"
+
+namespace darm::tile_scheduler {
+
+/// Pixels per side of the block that one ray of a pass stands for.
+inline constexpr int kBlock = 4;
+/// Passes after which every pixel has been looked at once, and at all four of the client's sample positions.
+inline constexpr int kPassesPerPicture = kBlock * kBlock;
+inline constexpr int kAllPasses = 4 * kPassesPerPicture;
+
+/// Positions within a pixel of the four samples that the client draws with: a 2x2 grid.
+inline constexpr std::array<glm::vec2, 4> kClientSamples{
+    {{0.25f, 0.25f}, {0.75f, 0.75f}, {0.75f, 0.25f}, {0.25f, 0.75f}}};
+
+/// Where pass 0..kAllPasses-1 puts its ray in each block, pixels in [0, 4)^2. The 16 pixels come in the order of a 4x4
+/// Bayer matrix (any first 2^k passes are spread evenly), each time at another of the client's sample positions.
+[[nodiscard]] glm::vec2 pass_offset(int pass);
+
+/// Blocks of a picture; a pass traces one ray per block whose position lies inside the picture.
+[[nodiscard]] std::uint32_t block_rows(const Viewport& viewport);
+[[nodiscard]] std::uint32_t block_columns(const Viewport& viewport);
+
+/// Traces rows [first_row, last_row) of blocks in pass `pass` into `out`. In the first 16 passes each sample also marks
+/// the texels around it that the unseen pixels of its block probably read (TileUse::early).
+void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out);
+
+/// Chain of a surface sample: its tile at the sharp level and at up to three coarser ones.
+[[nodiscard]] Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample);
+
+/// Adds one surface sample: its chain, the bilinear taps at each level of the chain, and texels within
+/// `early_pixels` of it (half the side of the square of pixels it stands for; 0: none).
+void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float early_pixels, VisibleSet& out);
+
+}  // namespace darm::tile_scheduler

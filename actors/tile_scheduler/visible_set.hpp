@@ -1,0 +1,57 @@
+// What one camera sees, gathered sample by sample: chains with their sample counts, tiles with the texels that are
+// read.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "actors/tile_scheduler/chain.hpp"
+#include "actors/types/texel_mask.hpp"
+
+namespace darm::tile_scheduler {
+
+/// Texels of one tile that are read, by reason.
+struct TileUse {
+  TexelMask sharp;     ///< read by samples of this tile whose sharp level it is
+  TexelMask early;     ///< probably read so: within the footprint of the block of pixels a sparse sample stands for
+  TexelMask fallback;  ///< read by samples of this tile if it serves a finer chain
+  TexelMask border;    ///< read by samples of a neighbouring tile across the edge
+};
+
+/// Accumulates samples of one camera. Bounded: past the limits new chains and tiles are left out (and counted).
+class VisibleSet {
+ public:
+  static constexpr std::size_t kMaxChains = 262144;
+  static constexpr std::size_t kMaxTiles = 65536;
+
+  /// `count` more samples use `chain`.
+  void add(const Chain& chain, float count);
+  /// A sample that hit nothing: counts in samples() only.
+  void add_samples(double count) { samples_ += count; }
+  /// The texels of `tile`; null if the set is full. Valid until the next call.
+  TileUse* use(TileId tile);
+  void merge(const VisibleSet& other);
+  void forget_early();
+  void clear();
+
+  [[nodiscard]] double samples() const { return samples_; }  ///< picture samples traced, hits or not
+  [[nodiscard]] const std::vector<Chain>& chains() const { return chains_.keys(); }
+  [[nodiscard]] std::span<const float> counts() const { return counts_; }  ///< parallel to chains()
+  [[nodiscard]] const std::vector<TileId>& tiles() const { return tiles_.keys(); }
+  [[nodiscard]] std::span<const TileUse> uses() const { return uses_; }  ///< parallel to tiles()
+  [[nodiscard]] const TileUse* find(TileId tile) const;
+  [[nodiscard]] std::size_t left_out() const { return left_out_; }
+
+ private:
+  ChainIndex chains_;
+  std::vector<float> counts_;
+  TileIndex tiles_;
+  std::vector<TileUse> uses_;
+  double samples_ = 0;
+  std::size_t left_out_ = 0;
+  TileId last_tile_ = kNoTile;  // neighbouring samples mostly read the same tile
+  std::size_t last_index_ = 0;
+};
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,45 @@
+// What a session needs: the set of its present pose, growing pass by pass, and for a while that of the pose before.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "actors/tile_scheduler/visible_set.hpp"
+#include "actors/types/frame_stamps.hpp"
+
+namespace darm::tile_scheduler {
+
+struct WorkingSetOptions {
+  Microseconds keep_previous = 500'000;  ///< how long the previous pose's set lives on
+  float previous_weight = 0.25f;         ///< weight of a share of the previous pose's samples, in 0..1
+};
+
+/// Accumulates the passes of one session's view. Bounded by VisibleSet's limits, twice.
+class WorkingSet {
+ public:
+  explicit WorkingSet(WorkingSetOptions options = {}) : options_(options) {}
+
+  /// The camera moved: what follows belongs to a new pose. The old set is kept if the new one has samples.
+  void start_pose(Microseconds now);
+  /// One more pass of the present pose.
+  void add_pass(const VisibleSet& pass);
+  /// Drops the previous pose's set when its time is over. True if it did.
+  bool expire(Microseconds now);
+
+  [[nodiscard]] int passes() const { return passes_; }
+  [[nodiscard]] const VisibleSet& current() const { return current_; }
+  /// Distinct chains of both poses; weights are shares of the view's samples.
+  [[nodiscard]] std::vector<WeightedChain> chains() const;
+  /// Calls visit(tile, use) for each tile of the present and then of the previous pose (a tile may come twice).
+  void for_each_use(const std::function<void(TileId, const TileUse&)>& visit) const;
+
+ private:
+  WorkingSetOptions options_;
+  VisibleSet current_;
+  VisibleSet previous_;
+  Microseconds moved_at_ = 0;
+  int passes_ = 0;
+};
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,220 @@
+#include "actors/tile_scheduler/visibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "actors/tile_scheduler/texel_taps.hpp"
+#include "actors/tile_scheduler/working_set.hpp"
+#include "tests/unit/tile_scheduler/quad_scene.hpp"
+
+namespace darm::tile_scheduler {
+namespace {
+
+using testing::make_room;
+using testing::make_world;
+using testing::Quad;
+
+constexpr Viewport kViewport{160, 90};
+
+TEST(Passes, SixteenCoverEveryPixelAndSixtyFourAllClientSamples) {
+  std::set<std::pair<int, int>> pixels;
+  std::set<std::pair<float, float>> samples;
+  for (int pass = 0; pass < kAllPasses; ++pass) {
+    const auto p = pass_offset(pass);
+    if (pass < kPassesPerPicture) pixels.emplace(static_cast<int>(p.x), static_cast<int>(p.y));
+    samples.emplace(p.x, p.y);
+  }
+  EXPECT_EQ(pixels.size(), 16u);
+  EXPECT_EQ(samples.size(), 64u);
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x)
+      for (const auto& s : kClientSamples) {
+        EXPECT_TRUE(samples.contains({static_cast<float>(x) + s.x, static_cast<float>(y) + s.y}));
+      }
+}
+
+// A wall straight ahead at distance d: a pixel covers d * spread world units both ways.
+TEST(SharpLevel, MatchesTheFormulaOnAPlaneAtKnownDistance) {
+  for (const float distance : {0.5f, 1.0f, 2.0f, 3.0f, 5.5f, 9.0f, 17.0f, 30.0f}) {
+    const auto world = make_world({Quad{{-50, -50, -distance}, {1, 0, 0}, {0, 1, 0}, 100, 100}}, 64, 6);
+    const auto camera = look_at({0, 0, 0}, {0, 0, -1}, 60);
+    const ViewSampler sampler(*world.layout, *world.rays, camera, kViewport);
+    std::array<SurfaceSample, kMaxLayers> out;
+    ASSERT_EQ(sampler.trace(80.3f, 45.2f, out), 1);
+    const float texels = distance * pixel_spread(camera, kViewport) * 64;
+    const auto footprint = footprint_of(out[0].uv_dx, out[0].uv_dy);
+    EXPECT_NEAR(footprint.minor * 64, texels, 1e-3f * texels);
+    EXPECT_NEAR(footprint.major * 64, texels, 1e-3f * texels);
+    EXPECT_EQ(out[0].level, std::clamp(static_cast<int>(std::floor(std::log2(texels))), 0, 5));
+  }
+}
+
+// A floor seen at angle a below the horizon: across the view the footprint is distance * spread, along it 1 / sin(a)
+// more.
+TEST(SharpLevel, FollowsTheMinorAxisOnATiltedPlane) {
+  const auto world = make_world({Quad{{-500, -1, 500}, {1, 0, 0}, {0, 0, -1}, 1000, 1000}}, 64, 6);
+  for (const double degrees : {80.0, 45.0, 20.0, 8.0}) {
+    const double a = degrees * M_PI / 180;
+    const auto camera = look_at({0, 0, 0}, {0, -std::sin(a), -std::cos(a)}, 40);
+    const ViewSampler sampler(*world.layout, *world.rays, camera, kViewport);
+    std::array<SurfaceSample, kMaxLayers> out;
+    ASSERT_EQ(sampler.trace(80.0f, 45.0f, out), 1);
+    const double across = pixel_spread(camera, kViewport) / std::sin(a);
+    const auto footprint = footprint_of(out[0].uv_dx, out[0].uv_dy);
+    EXPECT_NEAR(footprint.minor, across, 2e-3 * across) << degrees;
+    EXPECT_NEAR(footprint.major, across / std::sin(a), 2e-3 * across / std::sin(a)) << degrees;
+  }
+}
+
+TEST(SharpLevel, AgreesWithRaysThroughNeighbouringPixels) {
+  const auto world = make_room();
+  const Viewport large{1280, 720};
+  const ViewSampler sampler(*world.layout, *world.rays, look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55), large);
+  std::array<SurfaceSample, kMaxLayers> here, right, down;
+  int compared = 0;
+  for (float y = 20.5f; y < 700; y += 37)
+    for (float x = 20.5f; x < 1260; x += 41) {
+      if (sampler.trace(x, y, here) == 0 || sampler.trace(x + 0.1f, y, right) == 0 ||
+          sampler.trace(x, y + 0.1f, down) == 0)
+        continue;
+      if (right[0].patch != here[0].patch || down[0].patch != here[0].patch) continue;
+      const auto dx = (right[0].uv - here[0].uv) * 10.0f;
+      const auto dy = (down[0].uv - here[0].uv) * 10.0f;
+      const float tolerance = 0.05f * glm::length(dx) + 0.05f * glm::length(dy);
+      EXPECT_LT(glm::length(dx - here[0].uv_dx), tolerance);
+      EXPECT_LT(glm::length(dy - here[0].uv_dy), tolerance);
+      ++compared;
+    }
+  EXPECT_GT(compared, 200);
+}
+
+TEST(Footprint, IsZeroOrFiniteForAnyInput) {
+  const float inf = INFINITY;
+  EXPECT_EQ(footprint_of({NAN, 0}, {0, 1}).minor, 0);
+  EXPECT_EQ(footprint_of({inf, 0}, {0, 1}).major, 0);
+  EXPECT_EQ(footprint_of({0, 0}, {0, 0}).major, 0);
+  EXPECT_EQ(sharp_level(NAN, 4), 0);
+  EXPECT_EQ(sharp_level(inf, 4), 4);
+  EXPECT_EQ(sharp_level(0.3f, 4), 0);
+  EXPECT_EQ(sharp_level(4.1f, 4), 2);
+  const auto grazing = footprint_of({1e-3f, 0}, {0, 50});
+  EXPECT_LE(grazing.major, grazing.minor * kMaxAnisotropy * 1.001f);
+}
+
+TEST(ViewSampler, SeesThroughBlendedSurfacesAndTakesTheBackPatch) {
+  std::vector<Quad> quads;
+  quads.push_back({{-1, -1, -2}, {1, 0, 0}, {0, 1, 0}, 2, 2, scene::AlphaMode::kBlend, true});
+  quads.push_back({{-9, -9, -5}, {1, 0, 0}, {0, 1, 0}, 18, 18});
+  const auto world = make_world(quads, 16, 3);
+  std::array<SurfaceSample, kMaxLayers> out;
+  const ViewSampler front(*world.layout, *world.rays, look_at({0, 0, 0}, {0, 0, -1}, 40), kViewport);
+  ASSERT_EQ(front.trace(80.1f, 45.2f, out), 2);
+  EXPECT_EQ(out[0].patch, PatchId{0});
+  EXPECT_EQ(out[1].patch, PatchId{2});
+  const ViewSampler behind(*world.layout, *world.rays, look_at({0, 0, -4}, {0, 0, 0}, 40), kViewport);
+  ASSERT_EQ(behind.trace(80.1f, 45.2f, out), 1);
+  EXPECT_EQ(out[0].patch, PatchId{1});
+}
+
+VisibleSet trace_passes(const testing::TestWorld& world, const Camera& camera, int passes) {
+  const ViewSampler sampler(*world.layout, *world.rays, camera, kViewport);
+  WorkingSet set;
+  for (int pass = 0; pass < passes; ++pass) {
+    VisibleSet one;
+    trace_rows(sampler, pass, 0, block_rows(kViewport), one);
+    set.add_pass(one);
+  }
+  return set.current();
+}
+
+TEST(Visibility, SixtyFourPassesHoldEveryTexelTheClientReads) {
+  const auto world = make_room();
+  const auto camera = look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55);
+  const auto set = trace_passes(world, camera, kAllPasses);
+  EXPECT_EQ(set.samples(), 4.0 * kViewport.width * kViewport.height);
+  const ViewSampler sampler(*world.layout, *world.rays, camera, kViewport);
+  std::array<SurfaceSample, kMaxLayers> out;
+  int checked = 0;
+  for (std::uint32_t y = 0; y < kViewport.height; ++y)
+    for (std::uint32_t x = 0; x < kViewport.width; ++x)
+      for (const auto& s : kClientSamples) {
+        const int layers = sampler.trace(static_cast<float>(x) + s.x, static_cast<float>(y) + s.y, out);
+        for (int i = 0; i < layers; ++i) {
+          const auto& sample = out[static_cast<std::size_t>(i)];
+          const auto& level = world.layout->levels[static_cast<std::size_t>(sample.level)];
+          const auto texel = world.layout->texel_at(sample.patch, sample.level, sample.uv);
+          const auto holder = tile_holding(*world.layout, sample.level, texel);
+          for_each_tile_part(level, sample.level, taps_at(level, texel), [&](TileId tile, const TexelBox& part) {
+            const auto* use = set.find(tile);
+            ASSERT_NE(use, nullptr);
+            const auto& mask = tile == holder ? use->sharp : use->border;
+            for (int py = part.y0; py <= part.y1; ++py)
+              for (int px = part.x0; px <= part.x1; ++px) {
+                ASSERT_TRUE(mask.test(px, py));
+                ++checked;
+              }
+          });
+        }
+      }
+  EXPECT_GT(checked, 50000);
+}
+
+TEST(Visibility, FirstPassAlreadyMarksMostOfWhatTheEyeSees) {
+  const auto world = make_room();
+  const auto camera = look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55);
+  const auto first = trace_passes(world, camera, 1);
+  const auto full = trace_passes(world, camera, kAllPasses);
+  double seen = 0, marked = 0, extra = 0;
+  for (std::size_t i = 0; i < full.tiles().size(); ++i) {
+    const auto& whole = full.uses()[i].sharp;
+    const auto* early = first.find(full.tiles()[i]);
+    for (int bit = 0; bit < kTileTexels; ++bit) {
+      const bool is_marked = early != nullptr && early->early.test(bit);
+      if (whole.test(bit)) ++seen;
+      if (whole.test(bit) && is_marked) ++marked;
+      if (!whole.test(bit) && is_marked) ++extra;
+    }
+  }
+  EXPECT_GT(marked / seen, 0.9);
+  EXPECT_LT(extra / seen, 0.4);  // a small picture: many pixels lie at edges
+}
+
+TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
+  const auto world = make_room();
+  const ViewSampler left(*world.layout, *world.rays, look_at({0, 0.4, 1.5}, {-4, 0, -2}, 40), kViewport);
+  const ViewSampler ahead(*world.layout, *world.rays, look_at({0, 0.4, 1.5}, {0, 0, -9}, 40), kViewport);
+  VisibleSet a, b;
+  trace_rows(left, 0, 0, block_rows(kViewport), a);
+  trace_rows(ahead, 0, 0, block_rows(kViewport), b);
+  WorkingSetOptions options;
+  options.keep_previous = 100;
+  options.previous_weight = 0.25f;
+  WorkingSet set(options);
+  set.add_pass(a);
+  set.start_pose(1000);
+  set.add_pass(b);
+  const auto total = [&] {
+    double sum = 0;
+    for (const auto& c : set.chains()) sum += c.weight;
+    return sum;
+  };
+  const double hits_a = [&] {
+    double n = 0;
+    for (auto c : a.counts()) n += c;
+    return n / a.samples();
+  }();
+  const double hits_b = [&] {
+    double n = 0;
+    for (auto c : b.counts()) n += c;
+    return n / b.samples();
+  }();
+  EXPECT_NEAR(total(), hits_b + 0.25 * hits_a, 1e-3);
+  EXPECT_FALSE(set.expire(1099));
+  EXPECT_TRUE(set.expire(1100));
+  EXPECT_NEAR(total(), hits_b, 1e-3);
+}
+
+}  // namespace
+}  // namespace darm::tile_scheduler
