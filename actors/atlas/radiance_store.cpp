@@ -291,6 +291,11 @@ std::optional<TileView> RadianceStore::read(TileId tile) const {
   return TileView(block(e - 1)->planes);
 }
 
+bool RadianceStore::has(TileId tile) const {
+  const auto slot = slot_of(tile);
+  return slot && entry(*slot).load(std::memory_order_acquire) != 0;
+}
+
 std::uint32_t RadianceStore::version(TileId tile) const {
   const auto slot = slot_of(tile);
   if (!slot) return 0;

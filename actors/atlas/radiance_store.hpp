@@ -141,6 +141,8 @@ class RadianceStore {
 
   /// The tile's light; nullopt if it was never shaded, or is torn (counted once).
   [[nodiscard]] std::optional<TileView> read(TileId tile) const;
+  /// True if the tile has a block, whole or torn: a look into the directory, no more.
+  [[nodiscard]] bool has(TileId tile) const;
   /// Number of updates the tile has seen; 0: nothing stored. Grows over restarts.
   [[nodiscard]] std::uint32_t version(TileId tile) const;
 

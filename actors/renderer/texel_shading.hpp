@@ -1,0 +1,39 @@
+// Takes light samples for the texels of one tile that somebody sees, and puts them into the store.
+#pragma once
+
+#include <cstdint>
+
+#include "actors/atlas/radiance_store.hpp"
+#include "actors/renderer/tile_facts.hpp"
+#include "actors/renderer/tile_surface.hpp"
+#include "actors/types/error.hpp"
+#include "actors/types/texel_mask.hpp"
+
+namespace darm::renderer {
+
+/// How far a tile is: over those texels of a mask that have a surface.
+struct TileProgress {
+  float least = 0;             ///< samples of the texel with fewest
+  float mean = 0;              ///< samples a texel
+  std::uint32_t texels = 0;    ///< of the mask, with a surface
+  std::uint32_t unshaded = 0;  ///< of those, without a sample
+};
+
+struct ShadingResult {
+  TileProgress progress;          ///< after the samples
+  std::uint32_t samples = 0;      ///< taken
+  std::uint32_t quarantined = 0;  ///< refused because they were NaN, infinite or absurd
+};
+
+/// How far the tile is now. Reads the store.
+[[nodiscard]] TileProgress survey_tile(const atlas::RadianceStore& store, TileId tile, const TexelMask& mask,
+                                       const TileSurface& surface);
+
+/// Adds up to `passes` samples to each texel of `mask`; texels that are ahead of the least one by more than that wait,
+/// so that newly seen texels catch up. Nothing outside the mask is touched. Sample numbers continue where the store
+/// stands, so a restart goes on in the same sequence. The store is held open only to merge: a crash costs one merge.
+/// Fails if the store takes no new tile. One thread per tile.
+[[nodiscard]] Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask,
+                                               std::uint32_t passes, const TileSurface& surface);
+
+}  // namespace darm::renderer

@@ -1,0 +1,174 @@
+#include "actors/renderer/tile_display.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/tile_fill.hpp"
+
+namespace darm::renderer {
+
+using atlas::Layer;
+using atlas::Plane;
+
+namespace {
+
+constexpr float kLeastAlbedo = 1e-3f;
+
+float grey_of(const glm::vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+
+// Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
+struct Step {
+  int tile;
+  int texel;
+};
+Step step_of(int coordinate) {
+  if (coordinate < 0) return {0, coordinate + kTileSize};
+  if (coordinate >= kTileSize) return {2, coordinate - kTileSize};
+  return {1, coordinate};
+}
+
+}  // namespace
+
+struct SlotColours {
+  SlotFill<3> fill;
+};
+
+void TileDisplay::look_around(TileId id, const LevelTiles& level) {
+  for (int d = 0; d < 9; ++d) {
+    auto& n = around_[static_cast<std::size_t>(d)];
+    n = {};
+    const auto other = neighbour_of(id, level, d % 3 - 1, d / 3 - 1);
+    if (!other) continue;
+    n.light = store_.read(*other);
+    n.facts = facts_.find(*other);
+  }
+}
+
+int TileDisplay::radius_of(const TexelMask& mask) const {
+  const auto& own = around_[4];
+  if (options_.filter_samples <= 0 || !own.light || !own.facts) return 0;
+  float least = 0;
+  for (int t = 0; t < kTileTexels; ++t) {
+    if (!mask.test(t)) continue;
+    const float n = own.light->count(Layer::kSoft, t);
+    if (n > 0 && (least == 0 || n < least)) least = n;
+  }
+  return filter_radius(least, options_.filter_samples);
+}
+
+void TileDisplay::gather(int radius) {
+  window_.reset(radius);
+  for (int y = 0; y < window_.size; ++y) {
+    const Step row = step_of(y - radius - 1);
+    for (int x = 0; x < window_.size; ++x) {
+      const Step column = step_of(x - radius - 1);
+      const auto& from = around_[static_cast<std::size_t>(row.tile * 3 + column.tile)];
+      const auto at = static_cast<std::size_t>(y * window_.size + x);
+      const int texel = row.texel * kTileSize + column.texel;
+      if (!from.facts) continue;
+      window_.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
+      if (!from.light || !from.facts->known.test(texel) || window_.patch[at] == kNobody) continue;
+      const float n = from.light->count(Layer::kSoft, texel);
+      const glm::vec3 albedo = from.facts->albedo(texel);
+      const float grey = grey_of(albedo);
+      if (n <= 0 || grey < kLeastAlbedo) continue;
+      const glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
+      window_.count[at] = n;
+      for (int c = 0; c < 3; ++c) {
+        if (albedo[c] < kLeastAlbedo) continue;
+        window_.irradiance[static_cast<std::size_t>(c)][at] = soft[c] / albedo[c];
+        window_.trust[static_cast<std::size_t>(c)][at] = n;
+      }
+      window_.grey[at] = grey_of(soft) / grey;
+      window_.grey_m2[at] = from.light->plane(Plane::kSoftM2)[texel] / (grey * grey);
+    }
+  }
+}
+
+void TileDisplay::shade_slot(std::vector<float>& variance, SlotColours& colours) {
+  variance.assign(kSlotTexels, 0.0f);
+  for (int y = 0; y < kSlotSize; ++y) {
+    const Step row = step_of(y - 1);
+    for (int x = 0; x < kSlotSize; ++x) {
+      const Step column = step_of(x - 1);
+      const auto& from = around_[static_cast<std::size_t>(row.tile * 3 + column.tile)];
+      const auto at = static_cast<std::size_t>(y * kSlotSize + x);
+      const int texel = row.texel * kTileSize + column.texel;
+      if (from.facts) colours.fill.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
+      if (!from.light || from.light->count(Layer::kSoft, texel) <= 0) continue;
+      const glm::vec3 sharp = from.light->mean(Layer::kSharp, texel);
+      glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
+      const float grey_sharp = grey_of(sharp);
+      const float grey_soft = grey_of(soft);
+      float soft_variance = from.light->variance_of_mean(Layer::kSoft, texel, grey_soft * grey_soft);
+      const auto& f = filtered_[at];
+      if (f.known && from.facts) {
+        const glm::vec3 albedo = from.facts->albedo(texel);
+        for (int c = 0; c < 3; ++c)
+          if (albedo[c] >= kLeastAlbedo) soft[c] = f.irradiance[static_cast<std::size_t>(c)] * albedo[c];
+        soft_variance = f.variance * grey_of(albedo) * grey_of(albedo);
+      }
+      // One shadow ray a sample: a lone sample is mostly right, so its unknown spread is taken as half its value.
+      variance[at] =
+          soft_variance + from.light->variance_of_mean(Layer::kSharp, texel, 0.25f * grey_sharp * grey_sharp);
+      const glm::vec3 all = (sharp + soft) * options_.exposure;
+      colours.fill.set(static_cast<int>(at), {all.x, all.y, all.z});
+    }
+  }
+}
+
+float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const std::vector<float>& variance,
+                            float& samples) const {
+  double squares = 0;
+  double count = 0;
+  int texels = 0;
+  for (int t = 0; t < kTileTexels; ++t) {
+    if (!mask.test(t)) continue;
+    const auto at = static_cast<std::size_t>((t / kTileSize + 1) * kSlotSize + t % kTileSize + 1);
+    if (around_[4].facts && around_[4].facts->patch[static_cast<std::size_t>(t)] == kNobody) continue;
+    const float n = around_[4].light ? around_[4].light->count(Layer::kSoft, t) : 0.0f;
+    ++texels;
+    count += n;
+    if (n <= 0) {
+      squares += 0.25 * 0.25;  // filled from neighbours: nothing is known of it
+      continue;
+    }
+    const std::uint8_t* rgb = &image.rgb[at * 3];
+    const auto code = static_cast<std::uint8_t>(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2] + 0.5f);
+    const double e = double{srgb_slope(code)} * options_.exposure * std::sqrt(double{std::max(variance[at], 0.0f)});
+    squares += std::min(e * e, 0.25);
+  }
+  if (texels == 0) return samples = 0;
+  samples = static_cast<float>(count / texels);
+  return static_cast<float>(std::sqrt(squares / texels));
+}
+
+std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level, const TexelMask& mask) {
+  look_around(id, level);
+  const int radius = radius_of(mask);
+  if (radius > 0) {
+    gather(radius);
+    filter_.run(window_, options_.filter_samples, filtered_);
+  } else {
+    filtered_.assign(kSlotTexels, FilteredTexel{});
+  }
+  std::vector<float> variance;
+  SlotColours colours;
+  shade_slot(variance, colours);
+  if (std::none_of(colours.fill.known.begin(), colours.fill.known.end(), [](bool k) { return k; })) return std::nullopt;
+  colours.fill.run();
+
+  auto image = std::make_shared<TileImage>();
+  for (std::size_t at = 0; at < kSlotTexels; ++at)
+    for (std::size_t c = 0; c < 3; ++c) image->rgb[at * 3 + c] = srgb_code(colours.fill.value[at][c]);
+  convert_to_planes(*image);
+  if (around_[4].facts) image->coverage = around_[4].facts->coverage;
+
+  TilePicture picture;
+  picture.error = error_of(*image, mask, variance, picture.samples);
+  picture.image = std::move(image);
+  return picture;
+}
+
+}  // namespace darm::renderer

@@ -1,0 +1,58 @@
+// What display needs to know of a tile's surface and does not change with light: patches, albedo, coverage.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <unordered_map>
+
+#include "actors/renderer/tile_surface.hpp"
+#include "actors/types/texel_mask.hpp"
+#include "actors/types/tile_image.hpp"
+
+namespace darm::renderer {
+
+/// About 9 KB a tile. Albedo is averaged over a few points of each texel, only where somebody has shaded.
+struct TileFacts {
+  std::array<std::uint32_t, kTileTexels> patch{};
+  std::array<std::array<std::uint16_t, 3>, kTileTexels> albedo_bits{};  ///< 65535 is 1
+  TexelMask known;                                                      ///< texels whose albedo is there
+  std::shared_ptr<const CoverageTile> coverage;                         ///< null: opaque
+
+  [[nodiscard]] glm::vec3 albedo(int texel) const {
+    const auto& a = albedo_bits[static_cast<std::size_t>(texel)];
+    return glm::vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f);
+  }
+  /// Averages `points` albedo samples over each texel of `wanted` that is not known yet.
+  void learn_albedo(const TileSurface& surface, const TexelMask& wanted, int points = 4);
+};
+
+/// Mean alpha of the slot's 32x32 texels, border from the neighbour tiles; null if all of it is opaque.
+[[nodiscard]] std::shared_ptr<const CoverageTile> cover_tile(TileId id, const LevelTiles& level,
+                                                             const TileSurfaces& surfaces, int points = 8);
+
+/// Bounded cache, least recently made or found out first. Thread-safe; the facts of one tile are changed by one thread
+/// at a time, and not while they are read (the renderer's phases).
+class TileFactsCache {
+ public:
+  explicit TileFactsCache(std::size_t max_tiles = 8192) : max_tiles_(max_tiles < 16 ? 16 : max_tiles) {}
+
+  /// The tile's facts, made (patches and coverage) if they are not there. Null outside the level.
+  std::shared_ptr<TileFacts> get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces);
+  [[nodiscard]] std::shared_ptr<const TileFacts> find(TileId id) const;
+
+ private:
+  struct Entry {
+    std::shared_ptr<TileFacts> facts;
+    std::list<TileId>::iterator age;
+  };
+  mutable std::mutex mutex_;
+  std::size_t max_tiles_;
+  mutable std::list<TileId> ages_;  // oldest first
+  mutable std::unordered_map<TileId, Entry> entries_;
+};
+
+}  // namespace darm::renderer

@@ -1,0 +1,62 @@
+// What shading and display ask of a tile's surface. The scene's own answer is in tile_surface_scene.hpp; tests give
+// theirs.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+
+#include "actors/types/tile_id.hpp"
+
+namespace darm::renderer {
+
+/// One sample of the light that leaves a texel and does not depend on the eye, nits. See atlas::Layer.
+struct TexelLight {
+  glm::vec3 sharp{0.0f};
+  glm::vec3 soft{0.0f};
+};
+
+inline constexpr std::uint32_t kNobody = 0xffffffffu;
+
+/// The surface under the 900 payload texels of one tile. Immutable, thread-safe.
+class TileSurface {
+ public:
+  virtual ~TileSurface() = default;
+  /// Patch that owns the texel (gutter included), or kNobody.
+  [[nodiscard]] virtual std::uint32_t patch(int texel) const = 0;
+  /// Sample number `sample` of the texel's light: a random point of the texel's box, a random path from it. The same
+  /// number gives the same sample. nullopt: nothing of the patch under it.
+  [[nodiscard]] virtual std::optional<TexelLight> light(int texel, std::uint32_t sample) const = 0;
+  /// What reflected light is multiplied with at point `sample` of the texel, 0..1 a channel.
+  [[nodiscard]] virtual std::optional<glm::vec3> albedo(int texel, std::uint32_t sample) const = 0;
+  /// Opacity at point `sample` of the texel, 0..1.
+  [[nodiscard]] virtual std::optional<float> alpha(int texel, std::uint32_t sample) const = 0;
+  /// True if some texel's material is alpha MASK or BLEND.
+  [[nodiscard]] virtual bool translucent() const = 0;
+};
+
+/// The surfaces of all tiles. Thread-safe.
+class TileSurfaces {
+ public:
+  virtual ~TileSurfaces() = default;
+  /// Null outside the level.
+  [[nodiscard]] virtual std::shared_ptr<const TileSurface> tile(TileId id) const = 0;
+};
+
+/// Tiles of each level, for stepping to a neighbour.
+struct LevelTiles {
+  std::uint32_t x = 0;
+  std::uint32_t y = 0;
+};
+
+/// The tile (dx, dy) tiles away on the same level; nullopt outside it.
+[[nodiscard]] inline std::optional<TileId> neighbour_of(TileId id, const LevelTiles& level, int dx, int dy) {
+  if (level.x == 0) return std::nullopt;
+  const auto x = static_cast<std::int64_t>(id.index() % level.x) + dx;
+  const auto y = static_cast<std::int64_t>(id.index() / level.x) + dy;
+  if (x < 0 || y < 0 || x >= level.x || y >= level.y) return std::nullopt;
+  return TileId(id.level(), static_cast<std::uint32_t>(y * level.x + x));
+}
+
+}  // namespace darm::renderer

@@ -1,0 +1,204 @@
+#include "actors/renderer/tile_display.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/texel_shading.hpp"
+#include "tests/unit/renderer_tile/made_up_surface.hpp"
+
+namespace darm::renderer {
+namespace {
+
+class TileDisplayTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    dir_ = std::filesystem::temp_directory_path() / ("darm_display_" + std::to_string(::getpid()) + "_" +
+                                                     ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    const std::vector<std::uint32_t> tiles{9};
+    auto opened = atlas::RadianceStore::open(dir_, {}, tiles);
+    ASSERT_TRUE(opened);
+    store_ = std::move(*opened);
+  }
+  void TearDown() override {
+    store_.reset();
+    std::filesystem::remove_all(dir_);
+  }
+  ShadingResult shade(TileId id, std::uint32_t passes, const TexelMask& mask = TexelMask::all()) {
+    auto result = shade_tile(*store_, id, mask, passes, *world_.tile(id));
+    EXPECT_TRUE(result);
+    facts_.get(id, level_, world_)->learn_albedo(*world_.tile(id), mask);
+    return *result;
+  }
+  TilePicture draw(TileId id, float filter = 384, const TexelMask& mask = TexelMask::all()) {
+    TileDisplay display(*store_, facts_, DisplayOptions{1.0f, filter});
+    auto picture = display.draw(id, level_, mask);
+    EXPECT_TRUE(picture);
+    return picture ? *picture : TilePicture{};
+  }
+  static int code(const TilePicture& p, int x, int y, int c = 0) {  // payload coordinates, -1..30
+    return p.image->rgb[static_cast<std::size_t>(((y + 1) * kSlotSize + x + 1) * 3 + c)];
+  }
+
+  std::filesystem::path dir_;
+  std::unique_ptr<atlas::RadianceStore> store_;
+  MadeUpWorld world_;
+  TileFactsCache facts_;
+  LevelTiles level_{3, 3};
+  TileId middle_{0, 4};
+};
+
+TEST_F(TileDisplayTest, flat_light_gives_its_flat_colour) {
+  world_.world.light = [](TileId, int, std::uint32_t) { return TexelLight{glm::vec3(0.1f), glm::vec3(0.25f)}; };
+  shade(middle_, 1);
+  const auto picture = draw(middle_);
+  for (std::size_t i = 0; i < picture.image->rgb.size(); ++i) ASSERT_EQ(picture.image->rgb[i], srgb_code(0.35f));
+  EXPECT_EQ(picture.samples, 1.0f);
+}
+
+TEST_F(TileDisplayTest, unshaded_tile_has_no_picture) {
+  TileDisplay display(*store_, facts_, {});
+  EXPECT_FALSE(display.draw(middle_, level_, TexelMask::all()));
+}
+
+TEST_F(TileDisplayTest, border_is_the_neighbours_texel_where_it_is_shaded) {
+  world_.world.light = [](TileId id, int texel, std::uint32_t) {
+    return TexelLight{glm::vec3(static_cast<float>(id.index()) / 10 + static_cast<float>(texel % 30) / 1000), {}};
+  };
+  for (std::uint32_t i = 0; i < 8; ++i) shade(TileId(0, i), 1);
+  const auto picture = draw(middle_);
+  EXPECT_EQ(code(picture, -1, 7), srgb_code(0.3f + 0.029f));
+  EXPECT_EQ(code(picture, 30, 7), srgb_code(0.5f));
+  EXPECT_EQ(code(picture, 4, -1), srgb_code(0.1f + 0.004f));
+  EXPECT_EQ(code(picture, -1, -1), srgb_code(0.0f + 0.029f));
+  // tile 8 is not shaded: its corner repeats what is near in the same patch
+  EXPECT_NEAR(code(picture, 30, 30), srgb_code(0.5f), 60);
+}
+
+TEST_F(TileDisplayTest, filter_removes_noise_and_keeps_texture_and_patch_edges) {
+  world_.world.patch = [](TileId, int x, int) { return x < 15 ? 1u : 2u; };
+  world_.world.albedo = [](TileId, int x, int y) { return glm::vec3((x / 3 + y / 3) % 2 ? 0.8f : 0.1f); };
+  world_.world.light = [](TileId id, int t, std::uint32_t s) {
+    const float irradiance = (t % 30 < 15 ? 0.6f : 0.1f) * 2 * noise_of(id, t, s);
+    return TexelLight{glm::vec3(0.0f), glm::vec3(((t % 30 / 3 + t / 30 / 3) % 2 ? 0.8f : 0.1f) * irradiance)};
+  };
+  shade(middle_, 4);
+  const auto rms = [&](const TilePicture& p) {
+    double sum = 0;
+    for (int t = 0; t < kTileTexels; ++t) {
+      const float truth = (t % 30 < 15 ? 0.6f : 0.1f) * ((t % 30 / 3 + t / 30 / 3) % 2 ? 0.8f : 0.1f);
+      sum += std::pow((code(p, t % 30, t / 30) - srgb_code(truth)) / 255.0, 2);
+    }
+    return std::sqrt(sum / kTileTexels);
+  };
+  const double raw = rms(draw(middle_, 0));
+  const double filtered = rms(draw(middle_));
+  EXPECT_LT(filtered, raw / 4);
+}
+
+TEST_F(TileDisplayTest, filter_vanishes_as_samples_come_in) {
+  // A step of light inside one patch: with enough samples the picture is the plain mean.
+  world_.world.light = [](TileId id, int t, std::uint32_t s) {
+    return TexelLight{{}, glm::vec3((t % 30 < 11 ? 0.5f : 0.02f) * 2 * noise_of(id, t, s))};
+  };
+  for (int i = 0; i < 8; ++i) shade(middle_, 50);
+  const auto with = draw(middle_);
+  const auto without = draw(middle_, 0);
+  EXPECT_EQ(with.image->rgb, without.image->rgb);
+}
+
+TEST_F(TileDisplayTest, step_of_light_inside_a_patch_stays_sharp_when_it_stands_out_of_the_noise) {
+  world_.world.light = [](TileId id, int t, std::uint32_t s) {
+    return TexelLight{{}, glm::vec3((t % 30 < 15 ? 0.6f : 0.05f) * (0.8f + 0.4f * noise_of(id, t, s)))};
+  };
+  shade(middle_, 8);
+  const auto picture = draw(middle_);
+  for (int y = 0; y < 30; ++y) {
+    EXPECT_NEAR(code(picture, 12, y), srgb_code(0.6f), 8);
+    EXPECT_NEAR(code(picture, 17, y), srgb_code(0.05f), 8);
+  }
+}
+
+TEST_F(TileDisplayTest, texels_outside_the_mask_are_filled_from_their_own_patch) {
+  world_.world.patch = [](TileId, int x, int) { return x < 15 ? 1u : 2u; };
+  world_.world.light = [](TileId, int t, std::uint32_t) {
+    return TexelLight{glm::vec3(t % 30 < 15 ? 0.7f : 0.05f), {}};
+  };
+  TexelMask mask;
+  mask.set(2, 2);
+  mask.set(27, 27);
+  EXPECT_EQ(shade(middle_, 1, mask).samples, 2u);
+  const auto picture = draw(middle_, 384, mask);
+  EXPECT_EQ(code(picture, 14, 29), srgb_code(0.7f));
+  EXPECT_EQ(code(picture, 15, 0), srgb_code(0.05f));
+}
+
+TEST_F(TileDisplayTest, error_is_that_of_the_picture) {
+  world_.world.light = [](TileId id, int t, std::uint32_t s) {
+    return TexelLight{{}, glm::vec3(0.3f * 2 * noise_of(id, t, s))};
+  };
+  for (const std::uint32_t passes : {8u, 24u, 96u}) {
+    shade(middle_, passes);
+    const auto picture = draw(middle_, 0);
+    double sum = 0;
+    for (int t = 0; t < kTileTexels; ++t) sum += std::pow((code(picture, t % 30, t / 30) - srgb_code(0.3f)) / 255.0, 2);
+    const double truth = std::sqrt(sum / kTileTexels);
+    EXPECT_NEAR(picture.error / truth, 1.0, 0.25) << passes;
+  }
+}
+
+TEST_F(TileDisplayTest, light_that_is_no_number_never_reaches_the_picture) {
+  world_.world.light = [](TileId, int t, std::uint32_t s) {
+    const bool bad = t == 40 || s % 3 == 1;
+    return TexelLight{{}, glm::vec3(bad ? std::nanf("") : 0.3f)};
+  };
+  const auto result = shade(middle_, 4);
+  EXPECT_GT(result.quarantined, 0u);
+  EXPECT_EQ(result.progress.least, 4.0f);
+  const auto picture = draw(middle_, 0);
+  EXPECT_EQ(code(picture, 3, 3), srgb_code(0.3f));
+}
+
+TEST_F(TileDisplayTest, restart_continues_the_sequence) {
+  std::vector<std::uint32_t> numbers;
+  world_.world.light = [&](TileId, int t, std::uint32_t s) {
+    if (t == 7) numbers.push_back(s);
+    return TexelLight{{}, glm::vec3(0.3f)};
+  };
+  shade(middle_, 2);
+  store_.reset();
+  const std::vector<std::uint32_t> tiles{9};
+  store_ = std::move(*atlas::RadianceStore::open(dir_, {}, tiles));
+  shade(middle_, 3);
+  EXPECT_EQ(numbers, (std::vector<std::uint32_t>{0, 1, 2, 3, 4}));
+}
+
+TEST_F(TileDisplayTest, newly_seen_texels_catch_up_first) {
+  TexelMask some;
+  for (int x = 0; x < 10; ++x) some.set(x, 0);
+  shade(middle_, 8, some);
+  TexelMask more = some;
+  for (int x = 0; x < 10; ++x) more.set(x, 1);
+  const auto result = shade(middle_, 4, more);
+  EXPECT_EQ(result.samples, 40u);
+  EXPECT_EQ(result.progress.least, 4.0f);
+  EXPECT_EQ(result.progress.mean, 6.0f);
+  EXPECT_EQ(result.progress.texels, 20u);
+}
+
+TEST_F(TileDisplayTest, coverage_is_the_mean_alpha_with_border) {
+  world_.world.translucent = true;
+  world_.world.alpha = [](TileId id, int x, int) { return id.index() == 3 ? 0.25f : x == 5 ? 0.5f : 1.0f; };
+  const auto coverage = cover_tile(middle_, level_, world_);
+  ASSERT_TRUE(coverage);
+  EXPECT_EQ((*coverage)[5 * kSlotSize + 6], 128);
+  EXPECT_EQ((*coverage)[5 * kSlotSize + 7], 255);
+  EXPECT_EQ((*coverage)[5 * kSlotSize], 64);
+  world_.world.alpha = [](TileId, int, int) { return 1.0f; };
+  EXPECT_FALSE(cover_tile(middle_, level_, world_));
+}
+
+}  // namespace
+}  // namespace darm::renderer
