@@ -71,14 +71,14 @@ struct CloseSession {
 
 /// Bytes of the TCP stream. At most one waits: the next piece is read when this one is handled.
 struct BytesReceived {
-  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;  ///< one at a time: never full, never replaced
   std::vector<std::uint8_t> bytes;
   explicit BytesReceived(std::vector<std::uint8_t> b) : bytes(std::move(b)) {}
 };
 
 /// The packet under way is with the kernel.
 struct BytesSent {
-  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;  ///< one at a time: never full, never replaced
   std::size_t count = 0;
   explicit BytesSent(std::size_t n) : count(n) {}
 };

@@ -1,0 +1,224 @@
+#include "actors/session/geometry_stream.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <thread>
+
+#include "actors/session/chart_geometry.hpp"
+#include "proto/darm.pb.h"
+#include "proto/framing.hpp"
+#include "proto/limits.hpp"
+
+namespace darm::session {
+namespace {
+
+// Runs work(0) .. work(count - 1) on `threads` threads, this one included; they end before it returns.
+void parallel(std::size_t count, unsigned threads, const std::function<void(std::size_t)>& work) {
+  std::atomic<std::size_t> next{0};
+  const auto loop = [&] {
+    for (std::size_t i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::jthread> others;
+  for (unsigned t = 1; t < threads && t < count; ++t) others.emplace_back(loop);
+  loop();
+}
+
+std::uint32_t to_srgb8(float linear) {
+  const float v = std::clamp(linear, 0.0f, 1.0f);
+  const float s = v <= 0.0031308f ? v * 12.92f : 1.055f * std::pow(v, 1.0f / 2.4f) - 0.055f;
+  return static_cast<std::uint32_t>(std::lround(s * 255.0f));
+}
+
+std::uint32_t pack_srgb(const glm::vec3& linear) {
+  return (to_srgb8(linear.x) << 16) | (to_srgb8(linear.y) << 8) | to_srgb8(linear.z);
+}
+
+SharedBytes framed(const wire::Envelope& envelope) { return std::make_shared<const Bytes>(proto::frame(envelope)); }
+
+void put_levels(const atlas::Layout& layout, wire::SceneManifest& m) {
+  struct Entry {
+    std::uint32_t x, y;
+    float scale;
+  };
+  static_assert(sizeof(Entry) == proto::kPatchEntryBytes);
+  std::vector<Entry> table;
+  table.reserve(std::size_t{layout.patch_count} * layout.levels.size());
+  for (const auto& level : layout.levels) {
+    auto* info = m.add_levels();
+    info->set_density(level.density);
+    info->set_width(level.width);
+    info->set_height(level.height);
+    info->set_tiles_x(level.tiles_x);
+    info->set_tiles_y(level.tiles_y);
+    for (const auto& p : level.placements) table.push_back({p.x, p.y, p.scale});
+  }
+  m.set_patch_count(layout.patch_count);
+  const auto packed = encode_vertices(table.data(), table.size(), sizeof(Entry));
+  m.set_patch_table(packed.data(), packed.size());
+}
+
+void put_instances(const scene::Scene& scene, const atlas::Layout& layout, wire::SceneManifest& m) {
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const auto& instance = scene.instances[i];
+    const auto& charts = layout.instances[i];
+    const auto& material = scene.materials[scene.meshes[instance.mesh].material];
+    auto* info = m.add_instances();
+    info->set_chart(charts.chart);
+    for (int c = 0; c < 4; ++c) {
+      for (int r = 0; r < 4; ++r) info->add_to_world(instance.to_world[c][r]);
+    }
+    info->set_front_base(charts.front_base);
+    info->set_back_base(charts.back_base);
+    info->set_flipped(instance.flipped);
+    info->set_alpha_mode(static_cast<std::uint32_t>(material.alpha_mode));
+    info->set_alpha_cutoff(material.alpha_cutoff);
+    // Only a thin wall lets what is straight behind it through; volumes refract and are opaque tiles.
+    info->set_transmission(material.thickness > 0 ? 0.0f : material.transmission);
+    info->set_tint_rgb(pack_srgb(glm::vec3(material.base_color)));
+    info->set_object(instance.object);
+    info->set_dynamic(instance.object < scene.objects.size() && scene.objects[instance.object].dynamic);
+    info->set_camera_sees_back(material.double_sided);
+  }
+}
+
+void put_surroundings(const scene::Scene& scene, float exposure, wire::SceneManifest& m) {
+  m.set_sky_rgb_zenith(pack_srgb(scene.sky.zenith * exposure));
+  m.set_sky_rgb_horizon(pack_srgb(scene.sky.horizon * exposure));
+  m.set_sky_rgb_ground(pack_srgb(scene.sky.ground * exposure));
+  for (const auto& light : scene.lights) {
+    if (light.kind != scene::LightKind::kDirectional || !(light.angular_diameter > 0)) continue;
+    // The disc's radiance is its irradiance over its projected solid angle, pi sin^2 of the angular radius.
+    const float sine = std::sin(light.angular_diameter * 0.5f);
+    const glm::vec3 radiance = light.intensity / (3.14159265f * std::max(sine * sine, 1e-12f)) * exposure;
+    for (int c = 0; c < 3; ++c) m.add_sun(-light.direction[c]);
+    m.add_sun(std::cos(light.angular_diameter * 0.5f));
+    for (int c = 0; c < 3; ++c) m.add_sun(radiance[c]);
+    break;
+  }
+}
+
+Result<void> check(const scene::Scene& scene, const atlas::Layout& layout, float exposure) {
+  if (!(std::isfinite(exposure) && exposure > 0)) return fail("geometry: exposure must be finite and above 0");
+  if (layout.instances.size() != scene.instances.size()) {
+    return fail("geometry: the layout was made for another scene");
+  }
+  for (const auto& i : layout.instances) {
+    if (i.chart >= layout.charts.size()) return fail("geometry: the layout names a chart it does not have");
+  }
+  for (const auto& c : layout.charts) {
+    if (c.mesh >= scene.meshes.size() || c.local_patch.size() != scene.meshes[c.mesh].triangles.size() ||
+        c.uv.size() != c.local_patch.size()) {
+      return fail("geometry: a chart does not fit its mesh");
+    }
+  }
+  for (const auto& l : layout.levels) {
+    if (l.placements.size() != layout.patch_count) return fail("geometry: a level does not place every patch");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene::Scene& scene,
+                                                                    const atlas::Layout& layout, float exposure,
+                                                                    unsigned threads) {
+  if (auto ok = check(scene, layout, exposure); !ok) return std::unexpected(ok.error());
+  auto stream = std::make_shared<GeometryStream>();
+  stream->origin_ = scene.origin;
+  std::vector<std::vector<std::uint32_t>> instances_of(layout.charts.size());
+  for (std::uint32_t i = 0; i < layout.instances.size(); ++i) instances_of[layout.instances[i].chart].push_back(i);
+
+  std::vector<std::vector<std::uint32_t>> order(layout.charts.size());
+  parallel(order.size(), threads, [&](std::size_t c) {
+    order[c] = coherent_triangles(scene.meshes[layout.charts[c].mesh], layout.charts[c]);
+  });
+  struct Piece {
+    std::uint32_t chart;
+    std::size_t first, count;
+  };
+  std::vector<Piece> pieces;
+  for (std::uint32_t c = 0; c < order.size(); ++c) {
+    // Equal pieces, so that the last one is not a crumb.
+    const std::size_t parts = (order[c].size() + kTrianglesPerChunk - 1) / kTrianglesPerChunk;
+    for (std::size_t p = 0; p < parts; ++p) {
+      const auto first = order[c].size() * p / parts;
+      pieces.push_back({c, first, order[c].size() * (p + 1) / parts - first});
+    }
+  }
+  stream->chunks_.resize(pieces.size());
+  parallel(pieces.size(), threads, [&](std::size_t p) {
+    const auto& piece = pieces[p];
+    const auto& chart = layout.charts[piece.chart];
+    const auto g = encode_chunk(scene.meshes[chart.mesh], chart, order[piece.chart], piece.first, piece.count);
+    wire::Envelope envelope;
+    auto* chunk = envelope.mutable_geometry();
+    chunk->set_chart(piece.chart);
+    chunk->set_index(static_cast<std::uint32_t>(p));
+    chunk->set_vertex_count(g.vertex_count);
+    chunk->set_index_count(g.index_count);
+    chunk->set_vertices(g.vertices.data(), g.vertices.size());
+    chunk->set_indices(g.indices.data(), g.indices.size());
+    auto& out = stream->chunks_[p];
+    out.bytes = framed(envelope);
+    const glm::vec3 center = (g.bounds_min + g.bounds_max) * 0.5f;
+    const float radius = glm::length(g.bounds_max - g.bounds_min) * 0.5f;
+    for (const auto i : instances_of[piece.chart]) {
+      const auto& m = scene.instances[i].to_world;
+      const float stretch =
+          std::max({glm::length(glm::vec3(m[0])), glm::length(glm::vec3(m[1])), glm::length(glm::vec3(m[2]))});
+      out.placed.push_back({glm::vec3(m * glm::vec4(center, 1.0f)), radius * stretch});
+    }
+  });
+
+  wire::Envelope envelope;
+  auto& m = *envelope.mutable_manifest();
+  m.set_scene_hash(scene.hash);
+  m.mutable_origin()->set_x(scene.origin.x);
+  m.mutable_origin()->set_y(scene.origin.y);
+  m.mutable_origin()->set_z(scene.origin.z);
+  for (const auto& corner : {scene.bounds_min, scene.bounds_max}) {
+    for (int c = 0; c < 3; ++c) m.add_bounds(corner[c]);
+  }
+  m.set_q(layout.q);
+  put_levels(layout, m);
+  put_instances(scene, layout, m);
+  m.set_chart_count(static_cast<std::uint32_t>(layout.charts.size()));
+  m.set_geometry_chunks(static_cast<std::uint32_t>(pieces.size()));
+  put_surroundings(scene, exposure, m);
+  m.set_exposure(exposure);
+  m.set_name(std::filesystem::path(scene.path).stem().string());
+  m.set_triangles(scene.triangle_count());
+  stream->manifest_ = framed(envelope);
+  if (stream->manifest_->size() > proto::kMaxServerEnvelope) return fail("geometry: the manifest is over 512 MiB");
+  return std::shared_ptr<const GeometryStream>(std::move(stream));
+}
+
+std::vector<std::uint32_t> GeometryStream::nearest_first(const glm::dvec3& position) const {
+  const glm::vec3 eye(position - origin_);
+  std::vector<std::pair<float, std::uint32_t>> keyed;
+  keyed.reserve(chunks_.size());
+  for (std::uint32_t c = 0; c < chunks_.size(); ++c) {
+    float nearest = INFINITY;
+    for (const auto& s : chunks_[c].placed) {
+      nearest = std::min(nearest, std::max(0.0f, glm::distance(s.center, eye) - s.radius));
+    }
+    keyed.emplace_back(nearest, c);
+  }
+  std::sort(keyed.begin(), keyed.end());
+  std::vector<std::uint32_t> order(keyed.size());
+  std::transform(keyed.begin(), keyed.end(), order.begin(), [](const auto& k) { return k.second; });
+  return order;
+}
+
+std::size_t GeometryStream::total_bytes() const {
+  std::size_t bytes = manifest_->size();
+  for (const auto& c : chunks_) bytes += c.bytes->size();
+  return bytes;
+}
+
+}  // namespace darm::session

@@ -1,0 +1,50 @@
+// The scene as a client needs it: manifest and compressed geometry. Made once per scene, shared by all sessions.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "actors/atlas/layout.hpp"
+#include "actors/scene/scene.hpp"
+#include "actors/session/bytes.hpp"
+#include "actors/types/error.hpp"
+
+namespace darm::session {
+
+/// Immutable; thread-safe. All bytes are whole messages with their length in front (proto/framing.hpp).
+class GeometryStream {
+ public:
+  /// `exposure`: of DESIGN section 4, finite and > 0. `threads`: at least 1. Triangles without texels are left out.
+  [[nodiscard]] static Result<std::shared_ptr<const GeometryStream>> build(const scene::Scene& scene,
+                                                                           const atlas::Layout& layout, float exposure,
+                                                                           unsigned threads);
+
+  [[nodiscard]] const SharedBytes& manifest() const { return manifest_; }
+  [[nodiscard]] std::size_t chunk_count() const { return chunks_.size(); }
+  [[nodiscard]] const SharedBytes& chunk(std::uint32_t index) const { return chunks_[index].bytes; }
+
+  /// All chunks, nearest to `position` (file coordinates) first: by the distance to the nearest of its instances.
+  [[nodiscard]] std::vector<std::uint32_t> nearest_first(const glm::dvec3& position) const;
+  [[nodiscard]] std::size_t total_bytes() const;
+
+  /// Largest chunk: small enough to come in view-sized pieces, large enough to compress well.
+  static constexpr std::uint32_t kTrianglesPerChunk = 8192;
+
+ private:
+  struct Sphere {
+    glm::vec3 center{0.0f};  // recentred world space
+    float radius = 0;
+  };
+  struct Chunk {
+    SharedBytes bytes;
+    std::vector<Sphere> placed;  // one per instance
+  };
+
+  glm::dvec3 origin_{0.0};
+  SharedBytes manifest_;
+  std::vector<Chunk> chunks_;
+};
+
+}  // namespace darm::session
