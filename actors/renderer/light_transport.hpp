@@ -1,0 +1,97 @@
+// How light travels: the one definition of view-independent light, used by reference and atlas alike.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+
+#include "actors/renderer/light_set.hpp"
+#include "actors/renderer/material_point.hpp"
+#include "actors/renderer/sampler.hpp"
+#include "actors/renderer/trace/ray_scene.hpp"
+#include "actors/scene/scene.hpp"
+#include "actors/types/surface_point.hpp"
+
+namespace darm::renderer {
+
+/// Radiance in nits. `sharp`: own emission, suns and point lights, each behind one shadow ray. `soft`: sky, emissive
+/// surfaces, interreflection. Finite, >= 0.
+struct ViewIndependentLight {
+  glm::vec3 sharp{0.0f};
+  glm::vec3 soft{0.0f};
+  [[nodiscard]] glm::vec3 sum() const { return sharp + soft; }
+};
+
+/// Switches of the estimator. None changes the expectation, except for a `max_bounces` that cuts paths short.
+struct TransportOptions {
+  std::uint32_t max_bounces = 32;    ///< scatterings after the first vertex
+  std::uint32_t roulette_after = 3;  ///< paths may end by chance from this bounce on
+  /// For tests of multiple importance sampling: take emissive surfaces by one strategy only.
+  enum class Emitters : std::uint8_t { kBoth, kByLight, kByDirection };
+  Emitters emitters = Emitters::kBoth;
+};
+
+/// Path tracing with next-event estimation and MIS (power heuristic). Stateless: thread-safe, results depend on the
+/// arguments alone.
+/// Rules: shadow and bounce rays that meet the back of a single-sided triangle are blocked and see black, but for the
+/// share that BLEND or clear material lets through, and for the inside of refracting volumes. Refracting volumes block
+/// shadow rays; light crosses them on sampled paths.
+class LightTransport {
+ public:
+  LightTransport(std::shared_ptr<const scene::Scene> scene, std::shared_ptr<const trace::RayScene> rays,
+                 TransportOptions options = {});
+
+  /// One unbiased sample of the light that leaves `point` whatever the eye: emission + diffuse_albedo / pi * E(n).
+  [[nodiscard]] ViewIndependentLight view_independent(const SurfacePoint& point, Sampler& sampler) const;
+
+  /// One unbiased sample of the irradiance E(n), lux, of the side `point` names (n: normal-mapped), split as above, no
+  /// albedo. view_independent == emission(point) + diffuse_albedo(point) / pi * irradiance(point), sample by sample.
+  [[nodiscard]] ViewIndependentLight irradiance(const SurfacePoint& point, Sampler& sampler) const;
+
+  /// What E / pi is multiplied with: base * (1 - metallic) * (1 - transmission) * mean (1 - F). 0 for unlit and for
+  /// backs of single-sided triangles.
+  [[nodiscard]] glm::vec3 diffuse_albedo(const SurfacePoint& point) const;
+  /// Own radiance, nits (unlit: base colour). 0 on backs of single-sided triangles.
+  [[nodiscard]] glm::vec3 emission(const SurfacePoint& point) const;
+  /// Coverage: 1 unless the material is BLEND.
+  [[nodiscard]] float alpha(const SurfacePoint& point) const;
+  /// Weight of what is straight behind in the view-independent picture.
+  [[nodiscard]] glm::vec3 transparency(const SurfacePoint& point) const;
+
+  /// One sample of the radiance along a camera ray, every effect included.
+  [[nodiscard]] glm::vec3 full_radiance(const trace::Ray& ray, Sampler& sampler) const;
+
+  /// The same for the view-independent picture: alpha-weighted own light of each layer, plus what lies straight behind
+  /// times MaterialPoint::view_independent_transparency; sky and sun's disc where nothing is hit. Volumes are opaque.
+  [[nodiscard]] glm::vec3 view_independent_radiance(const trace::Ray& ray, Sampler& sampler) const;
+
+  [[nodiscard]] const trace::RayScene& rays() const { return *rays_; }
+  [[nodiscard]] const LightSet& lights() const { return lights_; }
+
+ private:
+  struct Path;
+
+  [[nodiscard]] bool sees_black(const trace::Surface& s) const;
+  [[nodiscard]] ViewIndependentLight diffuse_light(const trace::Surface& s, Sampler& sampler) const;
+  [[nodiscard]] glm::vec3 visibility(const trace::Surface& s, const glm::vec3& direction,
+                                     const glm::vec3* target) const;
+  template <class Scatter>
+  [[nodiscard]] glm::vec3 suns_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
+  template <class Scatter>
+  [[nodiscard]] glm::vec3 punctual_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
+  template <class Scatter>
+  [[nodiscard]] glm::vec3 emitters_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
+  [[nodiscard]] glm::vec3 trace_path(Path path, Sampler& sampler) const;
+  [[nodiscard]] bool next_surface(Path& path, trace::Surface& s, MaterialPoint& m, Sampler& sampler) const;
+  [[nodiscard]] glm::vec3 background(const Path& path) const;
+  [[nodiscard]] glm::vec3 emission_seen(const Path& path, const trace::Surface& s, const MaterialPoint& m) const;
+
+  std::shared_ptr<const scene::Scene> scene_;
+  std::shared_ptr<const trace::RayScene> rays_;
+  TransportOptions options_;
+  LightSet lights_;
+  bool any_passing_ = false;  // some material lets rays pass: BLEND or thin and clear
+  bool has_sky_ = false;
+};
+
+}  // namespace darm::renderer

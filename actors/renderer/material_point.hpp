@@ -1,0 +1,75 @@
+// A material read at one point of the surface: textures, factors and vertex colours multiplied out.
+#pragma once
+
+#include <algorithm>
+#include <glm/vec3.hpp>
+
+#include "actors/renderer/trace/surface.hpp"
+#include "actors/scene/scene.hpp"
+
+namespace darm::renderer {
+
+/// Smallest GGX alpha: mirrors are this rough (0.06 degrees), so that every lobe has a density and needs no special
+/// case.
+inline constexpr float kSmallestAlpha = 1e-3f;
+
+/// glTF metallic-roughness parameters at a point; all finite, colours >= 0, shares 0..1.
+struct MaterialPoint {
+  glm::vec3 base{1.0f};
+  glm::vec3 emission{0.0f};  ///< radiance of this side, nits; unlit: base colour
+  float alpha = 1;           ///< coverage: < 1 only for BLEND
+  float metallic = 0;
+  float ggx_alpha = 1;  ///< roughness squared, >= kSmallestAlpha
+  float f0 = 0.04f;     ///< of the dielectric share, from ior
+  float ior = 1.5f;
+  float transmission = 0;
+  bool thin = true;
+  bool unlit = false;
+  bool interface = true;  ///< false for ior 1: no boundary, so nothing is reflected by the dielectric share
+
+  /// Light goes straight through: thin and smooth, or a volume without a boundary (ior 1).
+  [[nodiscard]] bool passes_straight() const {
+    return transmission > 0 && (thin ? ggx_alpha <= kSmallestAlpha : !interface);
+  }
+
+  /// Schlick's Fresnel of the dielectric share.
+  [[nodiscard]] float fresnel(float cosine) const {
+    if (!interface) return 0;
+    const float m = std::clamp(1.0f - cosine, 0.0f, 1.0f);
+    const float m2 = m * m;
+    return f0 + (1.0f - f0) * m2 * m2 * m;
+  }
+
+  /// What the diffuse lobe reflects, the view averaged out: mean of 1 - F over cosine-weighted outgoing directions,
+  /// 1 - F0 - (1 - F0) / 21 for Schlick's formula (analytic: integral of 2 c (1 - c)^5 is 1/21).
+  [[nodiscard]] glm::vec3 diffuse_albedo() const {
+    if (unlit) return glm::vec3(0.0f);
+    const float through = interface ? (1.0f - f0) * (20.0f / 21.0f) : 1.0f;
+    return base * ((1.0f - metallic) * (1.0f - transmission) * through);
+  }
+
+  /// Weight of what is straight behind, in the view-independent picture: (1 - alpha) + alpha * transmission * tint.
+  [[nodiscard]] glm::vec3 view_independent_transparency() const {
+    const float clear = thin ? alpha * (1.0f - metallic) * transmission : 0.0f;
+    return glm::vec3(1.0f - alpha) + base * clear;
+  }
+
+  /// The same for light transport: only what is not scattered, Fresnel included.
+  [[nodiscard]] glm::vec3 straight_through(float cosine) const {
+    const float clear = passes_straight() ? alpha * (1.0f - metallic) * transmission * (1.0f - fresnel(cosine)) : 0.0f;
+    return glm::vec3(1.0f - alpha) + base * clear;
+  }
+};
+
+[[nodiscard]] MaterialPoint make_material_point(const scene::Scene& scene, const trace::Surface& surface);
+
+/// Emitted radiance only (the cheap part of the above), of a side that emits.
+[[nodiscard]] glm::vec3 emitted_radiance(const scene::Scene& scene, const trace::WorldInstance& placed,
+                                         std::uint32_t triangle, float u, float v);
+
+/// True if rays may pass the material's surface unscattered (BLEND, thin transmission).
+[[nodiscard]] inline bool may_pass(const scene::Material& m) {
+  return m.alpha_mode == scene::AlphaMode::kBlend || (m.transmission > 0 && m.thickness <= 0);
+}
+
+}  // namespace darm::renderer
