@@ -15,10 +15,12 @@ void WorkingSet::start_pose(Microseconds now) {
   passes_ = 0;
 }
 
-void WorkingSet::add_pass(const VisibleSet& pass) {
-  current_.merge(pass);
-  ++passes_;
-  if (passes_ == kPassesPerPicture) current_.forget_early();  // every pixel has been looked at: no more guesses
+void WorkingSet::add(const VisibleSet& samples, int passes) {
+  current_.merge(samples);
+  const int before = passes_;
+  passes_ += passes;
+  // Once every pixel has been looked at, no more guesses.
+  if (before < kPassesPerPicture && passes_ >= kPassesPerPicture) current_.forget_early();
 }
 
 bool WorkingSet::expire(Microseconds now) {

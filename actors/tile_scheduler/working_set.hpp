@@ -22,8 +22,8 @@ class WorkingSet {
 
   /// The camera moved: what follows belongs to a new pose. The old set is kept if the new one has samples.
   void start_pose(Microseconds now);
-  /// One more pass of the present pose.
-  void add_pass(const VisibleSet& pass);
+  /// More samples of the present pose: `passes` whole passes are complete with them (0: part of a pass).
+  void add(const VisibleSet& samples, int passes);
   /// Drops the previous pose's set when its time is over. True if it did.
   bool expire(Microseconds now);
 

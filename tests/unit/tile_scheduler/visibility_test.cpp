@@ -124,7 +124,7 @@ VisibleSet trace_passes(const testing::TestWorld& world, const Camera& camera, i
   for (int pass = 0; pass < passes; ++pass) {
     VisibleSet one;
     trace_rows(sampler, pass, 0, block_rows(kViewport), one);
-    set.add_pass(one);
+    set.add(one, 1);
   }
   return set.current();
 }
@@ -192,9 +192,9 @@ TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
   options.keep_previous = 100;
   options.previous_weight = 0.25f;
   WorkingSet set(options);
-  set.add_pass(a);
+  set.add(a, 1);
   set.start_pose(1000);
-  set.add_pass(b);
+  set.add(b, 1);
   const auto total = [&] {
     double sum = 0;
     for (const auto& c : set.chains()) sum += c.weight;

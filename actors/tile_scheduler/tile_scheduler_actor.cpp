@@ -1,0 +1,228 @@
+#include "actors/tile_scheduler/tile_scheduler_actor.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace darm::tile_scheduler {
+namespace {
+
+Microseconds period_of(double updates_per_second) {
+  const double rate = std::isfinite(updates_per_second) ? std::clamp(updates_per_second, 0.1, 1000.0) : 10.0;
+  return static_cast<Microseconds>(1e6 / rate);
+}
+
+bool same_view(const ViewChanged& a, const ViewChanged& b) {
+  return a.camera.position == b.camera.position && a.camera.orientation == b.camera.orientation &&
+         a.camera.fovy == b.camera.fovy && a.viewport.width == b.viewport.width &&
+         a.viewport.height == b.viewport.height;
+}
+
+ViewAnswer answer_to(const ViewChanged& view) {
+  ViewAnswer answer;
+  answer.session = view.session;
+  answer.sequence = view.sequence;
+  answer.stamps = view.stamps;
+  return answer;
+}
+
+}  // namespace
+
+TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> context,
+                                       std::shared_ptr<const atlas::Layout> layout,
+                                       std::shared_ptr<const renderer::trace::RayScene> rays,
+                                       std::shared_ptr<const Peers> peers, SchedulerOptions options,
+                                       runtime::MetricSink& metrics)
+    : Actor(std::move(context)),
+      layout_(std::move(layout)),
+      rays_(std::move(rays)),
+      peers_(std::move(peers)),
+      options_(options),
+      metrics_(metrics),
+      period_(period_of(options.updates_per_second)),
+      images_(options.image_bytes) {
+  options_.passes_moving = std::clamp(options_.passes_moving, 1, kAllPasses);
+  options_.passes_still = std::clamp(options_.passes_still, 1, kAllPasses);
+}
+
+void TileSchedulerActor::on_start() { schedule_tick(); }
+
+void TileSchedulerActor::schedule_tick() {
+  executor().after(std::chrono::microseconds(period_), [ref = self()] { ref.tell(Tick()); });
+}
+
+TileSchedulerActor::Session* TileSchedulerActor::find(SessionId id) {
+  const auto it = sessions_.find(id);
+  return it == sessions_.end() ? nullptr : it->second.get();
+}
+
+ImageLookup TileSchedulerActor::images() const {
+  return [this](TileId tile) { return images_.find(tile); };
+}
+
+void TileSchedulerActor::on(SessionOpened&& message) {
+  if (find(message.session) != nullptr) return;
+  auto session = std::make_unique<Session>(message.format, options_);
+  session->id = message.session;
+  session->stream_id = StreamId{next_stream_++};
+  session->encoder = peers_->make_encoder(session->stream_id, message.format);
+  peers_->set_receivers(session->stream_id, {message.session});
+  sessions_.emplace(message.session, std::move(session));
+}
+
+void TileSchedulerActor::on(SessionClosed&& message) {
+  const auto it = sessions_.find(message.session);
+  if (it == sessions_.end()) return;
+  const auto stream = it->second->stream_id;
+  sessions_.erase(it);
+  peers_->set_receivers(stream, {});
+  peers_->destroy_encoder(stream);
+  send_work();  // what only this session saw is no longer shaded
+}
+
+void TileSchedulerActor::on(ViewChanged&& message) {
+  auto* session = find(message.session);
+  if (session == nullptr || !is_valid(message.camera) || !is_valid(message.viewport)) return;
+  if (session->view && message.sequence <= session->view->sequence) return;
+  session->view = std::move(message);
+  // A camera that rests since the last update is looked at right away, not only at the next tick.
+  if (now_us() - session->last_start >= period_) start_view(*session);
+}
+
+void TileSchedulerActor::on(KeyFrameWanted&& message) {
+  auto* session = find(message.session);
+  if (session == nullptr) return;
+  session->stream.want_key();
+  if (session->set.passes() > 0) compose(*session);
+}
+
+void TileSchedulerActor::on(TilesShaded&& message) {
+  for (const auto& tile : message.tiles) pictures_came_ = images_.put(tile) || pictures_came_;
+}
+
+void TileSchedulerActor::on(FrameDone&& message) {
+  for (auto& [id, session] : sessions_) {
+    if (session->stream_id != message.stream) continue;
+    session->stream.frame_done(message.frame, message.ok);
+    if (session->stream.has_answers()) compose(*session);
+    return;
+  }
+}
+
+void TileSchedulerActor::on(ViewTraced&& message) {
+  for (auto& [id, session] : sessions_)
+    if (session->job && session->job->number() == message.job && session->job->done()) {
+      finish_view(*session);
+      return;
+    }
+}
+
+void TileSchedulerActor::on(Tick&&) {
+  schedule_tick();
+  bool work_changed = false;
+  for (auto& [id, session] : sessions_) {
+    if (session->job && session->job->done()) finish_view(*session);  // its ViewTraced found a full mailbox
+    const bool expired = session->set.expire(now_us());
+    if (expired) {
+      reallocate(*session);
+      work_changed = true;
+    } else if (pictures_came_ && session->set.passes() > 0) {
+      grant_available(session->demand, layout_->coarse_level(), session->stream.table(), images(), options_.allocation);
+    }
+    start_view(*session);
+    if (session->set.passes() > 0) compose(*session);
+  }
+  pictures_came_ = false;
+  if (work_changed) send_work();
+}
+
+// Begins the next trace of a session's newest view, if there is something to find out.
+void TileSchedulerActor::start_view(Session& session) {
+  if (session.job || !session.view) return;
+  const bool moved = !session.posed || !same_view(*session.posed, *session.view);
+  const int done = moved ? 0 : session.set.passes();
+  const int count = std::min(moved ? options_.passes_moving : options_.passes_still, kAllPasses - done);
+  const bool unanswered = session.view->sequence > session.taken_up;
+  session.taken_up = session.view->sequence;
+  auto answer = answer_to(*session.view);
+  answer.stamps.view_started = now_us();
+  if (count <= 0) {
+    if (!unanswered) return;
+    answer.stamps.view_ready = now_us();
+    session.stream.view_ready(answer);
+    compose(session);
+    return;
+  }
+  session.last_start = now_us();
+  auto job = std::make_shared<ViewJob>(next_job_++, layout_, rays_, session.view->camera, session.view->viewport, done,
+                                       count, 2 * executor().workers());
+  job->answer = answer;
+  if (!unanswered) job->answer.sequence = 0;
+  job->starts_pose = moved;
+  session.posed = session.posed && !moved ? session.posed : session.view;
+  session.job = job;
+  post_slices(job);
+}
+
+void TileSchedulerActor::post_slices(const std::shared_ptr<ViewJob>& job) {
+  for (unsigned slice = 0; slice < job->slice_count(); ++slice)
+    executor().post(runtime::Priority::kHigh, [job, slice, ref = self()] {
+      if (job->run_slice(slice)) ref.tell(ViewTraced(job->number()));
+    });
+}
+
+void TileSchedulerActor::finish_view(Session& session) {
+  const auto job = std::exchange(session.job, nullptr);
+  const auto traced = now_us();
+  metrics_.observe("darm_view_trace_seconds", double(traced - job->answer.stamps.view_started) * 1e-6);
+  if (job->starts_pose) session.set.start_pose(traced);
+  for (const auto& part : job->results()) session.set.add(part, 0);
+  session.set.add(VisibleSet(), job->pass_count());
+  reallocate(session);
+  send_work();
+  auto answer = job->answer;
+  answer.stamps.view_ready = now_us();
+  if (answer.sequence != 0) session.stream.view_ready(answer);
+  compose(session);
+}
+
+void TileSchedulerActor::reallocate(Session& session) {
+  const auto started = now_us();
+  session.demand = demand_of(session.set, *layout_, session.stream.table(), images(), options_.allocation);
+  for (const auto tile : session.demand.target.tiles) images_.touch(tile);
+  metrics_.observe("darm_allocation_seconds", double(now_us() - started) * 1e-6);
+  metrics_.observe("darm_view_tiles", double(session.demand.target.tiles.size()));
+}
+
+void TileSchedulerActor::send_work() {
+  std::vector<const std::vector<renderer::TileRequest>*> views;
+  for (const auto& [id, session] : sessions_) views.push_back(&session->demand.requests);
+  auto work = std::make_shared<const std::vector<renderer::TileRequest>>(join_requests(views));
+  peers_->renderer().tell(renderer::ShadeTiles(std::move(work), next_working_set_++));
+}
+
+void TileSchedulerActor::compose(Session& session) {
+  const auto started = now_us();
+  const float error = view_error(session.demand, images(), options_.coarse_error);
+  auto step = session.stream.step(session.demand.granted.tiles, images(), error, started);
+  for (const auto& answer : step.no_change)
+    peers_->sessions->find(answer.session).tell(session::NoChange(answer, error));
+  if (step.frame) send_frame(session, std::move(*step.frame));
+  metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
+}
+
+void TileSchedulerActor::send_frame(Session& session, encoder::ComposeFrame frame) {
+  metrics_.observe("darm_frame_writes", double(frame.writes.size()));
+  metrics_.observe("darm_frame_edits", double(frame.edits.size()));
+  std::size_t used = 0;
+  for (const auto& [id, other] : sessions_) used += other->stream.table().size();
+  metrics_.set("darm_slots_used", double(used));
+  const auto number = frame.frame;
+  if (session.encoder.tell(std::move(frame))) return;
+  // The encoder is gone: a new one starts with a key frame, at the next tick.
+  session.encoder = peers_->make_encoder(session.stream_id, session.format);
+  session.stream.frame_done(number, false);
+}
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,104 @@
+// The tile scheduler: what each session sees -> what is shaded, what its stream holds, when a frame goes out.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "actors/encoder/encoder_messages.hpp"
+#include "actors/renderer/renderer_messages.hpp"
+#include "actors/runtime/actor.hpp"
+#include "actors/runtime/metrics.hpp"
+#include "actors/runtime/registry.hpp"
+#include "actors/session/session_messages.hpp"
+#include "actors/tile_scheduler/image_store.hpp"
+#include "actors/tile_scheduler/tile_scheduler_messages.hpp"
+#include "actors/tile_scheduler/view_demand.hpp"
+#include "actors/tile_scheduler/view_job.hpp"
+
+namespace darm::tile_scheduler {
+
+struct SchedulerOptions {
+  double updates_per_second = 10;        ///< 0.1..1000: traces, allocations and frames per session
+  int passes_moving = 1;                 ///< visibility passes in the first update of a new pose, 1..64
+  int passes_still = 2;                  ///< and in each further one, until kAllPasses are done
+  std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
+  float coarse_error = 0.25f;            ///< display error assumed of what CoarseTex serves
+  WorkingSetOptions working_set;
+  AllocationOptions allocation;
+  StreamOptions stream;
+};
+
+/// The scheduler's neighbours, resolved at each use, so that they may be spawned after it. Every member must be set.
+struct Peers {
+  std::function<runtime::Ref<renderer::Inbox>()> renderer;
+  /// Makes the encoder actor of a stream; also called again where the old one no longer takes messages.
+  std::function<runtime::Ref<encoder::Inbox>(StreamId, const StreamFormat&)> make_encoder;
+  std::function<void(StreamId)> destroy_encoder;
+  /// Who gets the frames of a stream; empty before the stream is destroyed.
+  std::function<void(StreamId, std::vector<SessionId>)> set_receivers;
+  std::shared_ptr<runtime::Registry<SessionId, session::Inbox>> sessions;
+};
+
+class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
+ public:
+  /// `rays` must have been built from the scene that `layout` describes. `metrics` must outlive the actor.
+  TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> context, std::shared_ptr<const atlas::Layout> layout,
+                     std::shared_ptr<const renderer::trace::RayScene> rays, std::shared_ptr<const Peers> peers,
+                     SchedulerOptions options, runtime::MetricSink& metrics = runtime::null_metrics());
+
+  void on_start() override;
+  void on(SessionOpened&& message);
+  void on(SessionClosed&& message);
+  void on(ViewChanged&& message);
+  void on(KeyFrameWanted&& message);
+  void on(TilesShaded&& message);
+  void on(FrameDone&& message);
+  void on(ViewTraced&& message);
+  void on(Tick&& message);
+
+ private:
+  struct Session {
+    SessionId id{};
+    StreamId stream_id{};
+    StreamFormat format;
+    runtime::Ref<encoder::Inbox> encoder;
+    StreamState stream;
+    WorkingSet set;
+    ViewDemand demand;
+    std::optional<ViewChanged> view;   // newest camera
+    std::optional<ViewChanged> posed;  // the camera of the working set's pose
+    CameraSequence taken_up = 0;       // newest sequence that a trace or an answer includes
+    std::shared_ptr<ViewJob> job;      // under way
+    Microseconds last_start = 0;
+    Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
+  };
+
+  [[nodiscard]] ImageLookup images() const;
+  [[nodiscard]] Session* find(SessionId id);
+  void schedule_tick();
+  void start_view(Session& session);
+  void post_slices(const std::shared_ptr<ViewJob>& job);
+  void finish_view(Session& session);
+  void reallocate(Session& session);
+  void send_work();
+  void compose(Session& session);
+  void send_frame(Session& session, encoder::ComposeFrame frame);
+
+  std::shared_ptr<const atlas::Layout> layout_;
+  std::shared_ptr<const renderer::trace::RayScene> rays_;
+  std::shared_ptr<const Peers> peers_;
+  SchedulerOptions options_;
+  runtime::MetricSink& metrics_;
+  Microseconds period_;
+  ImageStore images_;
+  std::map<SessionId, std::unique_ptr<Session>> sessions_;
+  std::uint64_t next_job_ = 1;
+  std::uint64_t next_working_set_ = 1;
+  std::uint32_t next_stream_ = 1;
+  bool pictures_came_ = false;  // since the last tick
+};
+
+}  // namespace darm::tile_scheduler

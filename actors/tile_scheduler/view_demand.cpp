@@ -1,0 +1,147 @@
+#include "actors/tile_scheduler/view_demand.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace darm::tile_scheduler {
+namespace {
+
+using renderer::TileRequest;
+
+// The target's tiles by number, with what the requests need of them.
+struct Target {
+  TileIndex tiles;
+  std::vector<bool> as_fallback;  // serves some chain from a coarser level
+
+  Target(const ViewDemand& demand) : as_fallback(demand.target.tiles.size(), false) {
+    tiles.reserve(demand.target.tiles.size());
+    for (const auto tile : demand.target.tiles) tiles.insert(tile);
+    for (std::size_t c = 0; c < demand.chains.size(); ++c) {
+      const auto position = demand.target.served[c];
+      if (position == 0 || position >= kChainLength) continue;
+      const auto number = tiles.find(demand.chains[c].chain.tiles[position]);
+      if (number != TileIndex::kAbsent) as_fallback[number] = true;
+    }
+  }
+};
+
+// Largest weight among the target's tiles beside `tile`; 0 if there is none.
+float weight_beside(const atlas::Layout& layout, const ViewDemand& demand, const Target& target, TileId tile) {
+  const auto& level = layout.levels[static_cast<std::size_t>(tile.level())];
+  const auto tx = static_cast<int>(tile.index() % level.tiles_x);
+  const auto ty = static_cast<int>(tile.index() / level.tiles_x);
+  float weight = 0;
+  for (int y = std::max(0, ty - 1); y <= std::min(ty + 1, static_cast<int>(level.tiles_y) - 1); ++y)
+    for (int x = std::max(0, tx - 1); x <= std::min(tx + 1, static_cast<int>(level.tiles_x) - 1); ++x) {
+      const auto index = static_cast<std::uint32_t>(y) * level.tiles_x + static_cast<std::uint32_t>(x);
+      const auto number = target.tiles.find(TileId(tile.level(), index));
+      if (number != TileIndex::kAbsent) weight = std::max(weight, demand.target.weights[number]);
+    }
+  return weight;
+}
+
+std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout& layout, const ViewDemand& demand) {
+  const Target target(demand);
+  TileIndex requested;
+  std::vector<TileRequest> out;
+  const auto add = [&](TileId tile, const TexelMask& mask, float weight, bool display) {
+    const auto number = requested.insert(tile);
+    if (number == out.size()) {
+      out.emplace_back();
+      out.back().tile = tile;
+      out.back().weight = weight;
+      out.back().display = display;
+    }
+    out[number].mask |= mask;
+  };
+  set.for_each_use([&](TileId tile, const TileUse& use) {
+    const auto number = target.tiles.find(tile);
+    TexelMask mask = use.border;
+    if (number != TileIndex::kAbsent) {
+      mask |= use.sharp;
+      mask |= use.early;
+      if (target.as_fallback[number]) mask |= use.fallback;
+      if (!mask.empty()) add(tile, mask, demand.target.weights[number], true);
+    } else if (!mask.empty()) {
+      const float weight = weight_beside(layout, demand, target, tile);
+      if (weight > 0) add(tile, mask, weight, false);
+    }
+  });
+  return out;
+}
+
+AllocationRequest allocation_request(const ViewDemand& demand, std::span<const TileId> residents, std::size_t slots,
+                                     int coarse_level) {
+  AllocationRequest request;
+  request.chains = demand.chains;
+  request.residents = residents;
+  request.slots = slots;
+  request.coarse_level = coarse_level;
+  return request;
+}
+
+bool has_image(const ImageLookup& images, TileId tile) {
+  const auto* stored = images(tile);
+  return stored != nullptr && stored->image != nullptr;
+}
+
+}  // namespace
+
+ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
+                     const ImageLookup& images, const AllocationOptions& options) {
+  ViewDemand demand;
+  demand.chains = set.chains();
+  const auto residents = table.residents();
+  demand.target =
+      allocate_slots(allocation_request(demand, residents, table.capacity(), layout.coarse_level()), options);
+  grant_available(demand, layout.coarse_level(), table, images, options);
+  demand.requests = requests_of(set, layout, demand);
+  return demand;
+}
+
+void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
+                     const AllocationOptions& options) {
+  const auto& tiles = demand.target.tiles;
+  if (std::all_of(tiles.begin(), tiles.end(), [&](TileId t) { return has_image(images, t); })) {
+    demand.granted = demand.target;
+    return;
+  }
+  const auto residents = table.residents();
+  auto request = allocation_request(demand, residents, table.capacity(), coarse_level);
+  request.available = [&](TileId t) { return has_image(images, t); };
+  demand.granted = allocate_slots(request, options);
+}
+
+float view_error(const ViewDemand& demand, const ImageLookup& images, float coarse_error) {
+  double sum = 0;
+  double weight = 0;
+  for (std::size_t c = 0; c < demand.chains.size(); ++c) {
+    const auto& [chain, share] = demand.chains[c];
+    const auto position = demand.granted.served[c];
+    double error = double(coarse_error);
+    if (position < kChainLength)
+      if (const auto* stored = images(chain.tiles[position])) error = double(stored->error);
+    sum += double(share) * error * error;
+    weight += double(share);
+  }
+  return weight > 0 ? static_cast<float>(std::sqrt(sum / weight)) : coarse_error;
+}
+
+std::vector<TileRequest> join_requests(const std::vector<const std::vector<TileRequest>*>& views) {
+  TileIndex index;
+  std::vector<TileRequest> out;
+  for (const auto* view : views)
+    for (const auto& request : *view) {
+      const auto number = index.insert(request.tile);
+      if (number == out.size()) {
+        out.push_back(request);
+        continue;
+      }
+      out[number].weight += request.weight;
+      out[number].display = out[number].display || request.display;
+      out[number].mask |= request.mask;
+    }
+  return out;
+}
+
+}  // namespace darm::tile_scheduler

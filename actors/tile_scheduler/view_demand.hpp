@@ -1,0 +1,39 @@
+// From a working set to decisions: which tiles a view should have, which it can have now, what must be shaded. Pure.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "actors/atlas/layout.hpp"
+#include "actors/renderer/renderer_messages.hpp"
+#include "actors/tile_scheduler/slot_allocation.hpp"
+#include "actors/tile_scheduler/stream_state.hpp"
+#include "actors/tile_scheduler/working_set.hpp"
+
+namespace darm::tile_scheduler {
+
+/// What a view asks for, newest allocation.
+struct ViewDemand {
+  std::vector<WeightedChain> chains;
+  Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded
+  Allocation granted;                           ///< the tiles it can have now: these get slots
+  std::vector<renderer::TileRequest> requests;  ///< distinct tiles
+};
+
+/// Chooses target and granted tiles for `slots` slots and makes the shading requests of the target.
+[[nodiscard]] ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
+                                   const ImageLookup& images, const AllocationOptions& options);
+
+/// Chooses `demand.granted` anew after pictures have come.
+void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
+                     const AllocationOptions& options);
+
+/// Estimated display error of the view: RMS over its samples of the error of the tile that serves each. Samples that
+/// CoarseTex serves count with `coarse_error`. 0..1; `coarse_error` without samples.
+[[nodiscard]] float view_error(const ViewDemand& demand, const ImageLookup& images, float coarse_error);
+
+/// The requests of all views as one working set: weights add, masks join, displayed if any view displays it.
+[[nodiscard]] std::vector<renderer::TileRequest> join_requests(
+    const std::vector<const std::vector<renderer::TileRequest>*>& views);
+
+}  // namespace darm::tile_scheduler

@@ -1,0 +1,261 @@
+#include "actors/tile_scheduler/tile_scheduler_actor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "actors/runtime/deterministic_system.hpp"
+#include "tests/unit/tile_scheduler/quad_scene.hpp"
+
+namespace darm::tile_scheduler {
+namespace {
+
+using namespace std::chrono_literals;
+
+// What the neighbours heard; outlives the actors.
+struct Heard {
+  std::vector<renderer::ShadeTiles> work;
+  std::map<StreamId, std::vector<encoder::ComposeFrame>> frames;
+  std::vector<session::NoChange> no_changes;
+  std::map<StreamId, std::vector<SessionId>> receivers;
+  std::set<StreamId> encoders;
+};
+
+class FakeRenderer : public runtime::Actor<renderer::Inbox> {
+ public:
+  FakeRenderer(runtime::Context<renderer::Inbox> context, Heard* heard) : Actor(std::move(context)), heard_(heard) {}
+  void on(renderer::ShadeTiles&& m) { heard_->work.push_back(m); }
+  void on(renderer::SliceFinished&&) {}
+
+ private:
+  Heard* heard_;
+};
+
+class FakeEncoder : public runtime::Actor<encoder::Inbox> {
+ public:
+  FakeEncoder(runtime::Context<encoder::Inbox> context, Heard* heard, StreamId stream)
+      : Actor(std::move(context)), heard_(heard), stream_(stream) {}
+  void on(encoder::ComposeFrame&& m) { heard_->frames[stream_].push_back(std::move(m)); }
+  void on(encoder::PictureEncoded&&) {}
+
+ private:
+  Heard* heard_;
+  StreamId stream_;
+};
+
+class FakeSession : public runtime::Actor<session::Inbox> {
+ public:
+  FakeSession(runtime::Context<session::Inbox> context, Heard* heard) : Actor(std::move(context)), heard_(heard) {}
+  void on(session::NoChange&& m) { heard_->no_changes.push_back(m); }
+  template <class M>
+  void on(M&&) {}
+
+ private:
+  Heard* heard_;
+};
+
+class TileScheduler : public ::testing::Test {
+ protected:
+  TileScheduler() : world_(testing::make_room()), peers_(std::make_shared<Peers>()) {
+    renderer_ = system_.spawn<FakeRenderer>("renderer", 16, &heard_);
+    peers_->renderer = [this] { return renderer_; };
+    peers_->make_encoder = [this](StreamId id, const StreamFormat&) {
+      heard_.encoders.insert(id);
+      return system_.spawn<FakeEncoder>("encoder/" + std::to_string(static_cast<unsigned>(id)), 16, &heard_, id);
+    };
+    peers_->destroy_encoder = [this](StreamId id) { heard_.encoders.erase(id); };
+    peers_->set_receivers = [this](StreamId id, std::vector<SessionId> who) { heard_.receivers[id] = std::move(who); };
+    peers_->sessions = std::make_shared<runtime::Registry<SessionId, session::Inbox>>();
+    std::shared_ptr<const Peers> peers = peers_;
+    scheduler_ =
+        system_.spawn<TileSchedulerActor>("tile_scheduler", 256, world_.layout, world_.rays, peers, SchedulerOptions());
+    system_.run_until_idle();
+  }
+
+  void open(SessionId id) {
+    peers_->sessions->add(
+        id, system_.spawn<FakeSession>("session/" + std::to_string(static_cast<unsigned>(id)), 16, &heard_));
+    StreamFormat format;
+    format.phystex_size = 1024;
+    scheduler_.tell(SessionOpened(id, format));
+    system_.run_until_idle();
+  }
+  void look(SessionId id, CameraSequence sequence, const Camera& camera) {
+    scheduler_.tell(ViewChanged(id, sequence, camera, Viewport{160, 90}, FrameStamps{}));
+    system_.run_until_idle();
+  }
+  // The renderer has shaded everything it was last asked to display.
+  void shade_all(std::uint32_t version) {
+    std::vector<ShadedTile> tiles;
+    for (const auto& request : *heard_.work.back().work) {
+      if (!request.display) continue;
+      ShadedTile tile;
+      tile.tile = request.tile;
+      tile.version = version;
+      tile.error = 0.02f;
+      tile.image = std::make_shared<TileImage>();
+      tiles.push_back(tile);
+    }
+    scheduler_.tell(TilesShaded(std::move(tiles)));
+    system_.run_until_idle();
+  }
+  // The encoder has finished its newest frame.
+  void finish_frame(StreamId stream, bool ok = true) {
+    scheduler_.tell(FrameDone(stream, heard_.frames[stream].back().frame, ok));
+    system_.run_until_idle();
+  }
+  void tick() { system_.advance(100ms); }
+
+  const Camera ahead_ = look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55);
+  const Camera aside_ = look_at({0.3, 0.4, 1.5}, {-4, 0, -2}, 55);
+  const SessionId ann_{1};
+  const StreamId first_{1};
+  Heard heard_;
+  testing::TestWorld world_;
+  std::shared_ptr<Peers> peers_;
+  runtime::DeterministicSystem system_;
+  runtime::Ref<renderer::Inbox> renderer_;
+  runtime::Ref<tile_scheduler::Inbox> scheduler_;
+};
+
+TEST_F(TileScheduler, AnswersACameraWithWorkForTheRendererAndAKeyFrame) {
+  open(ann_);
+  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
+  tick();
+  EXPECT_TRUE(heard_.frames[first_].empty()) << "no camera, no frame";
+  look(ann_, 1, ahead_);
+  ASSERT_FALSE(heard_.work.empty());
+  EXPECT_FALSE(heard_.work.back().work->empty());
+  ASSERT_EQ(heard_.frames[first_].size(), 1u);
+  const auto& frame = heard_.frames[first_].back();
+  EXPECT_TRUE(frame.key);
+  ASSERT_EQ(frame.answers.size(), 1u);
+  EXPECT_EQ(frame.answers[0].sequence, 1u);
+  EXPECT_EQ(frame.answers[0].session, ann_);
+}
+
+TEST_F(TileScheduler, SendsTilesOnceTheyHavePictures) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  finish_frame(first_);
+  shade_all(1);
+  tick();
+  ASSERT_GE(heard_.frames[first_].size(), 2u);
+  const auto& frame = heard_.frames[first_].back();
+  EXPECT_FALSE(frame.key);
+  EXPECT_FALSE(frame.writes.empty());
+  EXPECT_EQ(frame.writes.size(), frame.edits.size());
+  EXPECT_LT(frame.error, 0.05f);
+}
+
+TEST_F(TileScheduler, KeepsOneFrameInFlight) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  shade_all(1);
+  tick();
+  tick();
+  EXPECT_EQ(heard_.frames[first_].size(), 1u);
+  finish_frame(first_);
+  tick();
+  EXPECT_EQ(heard_.frames[first_].size(), 2u);
+}
+
+TEST_F(TileScheduler, StopsTracingAndSendsNothingWhenAStillViewIsKnown) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  for (int i = 0; i < 60; ++i) {
+    shade_all(1);
+    finish_frame(first_);
+    tick();
+  }
+  const auto frames = heard_.frames[first_].size();
+  const auto work = heard_.work.size();
+  system_.clear_log();
+  for (int i = 0; i < 10; ++i) tick();
+  EXPECT_EQ(heard_.frames[first_].size(), frames);
+  EXPECT_EQ(heard_.work.size(), work);
+  for (const auto& handled : system_.messages_log()) EXPECT_EQ(handled.message, "Tick");
+  look(ann_, 2, ahead_);
+  ASSERT_EQ(heard_.no_changes.size(), 1u);
+  EXPECT_EQ(heard_.no_changes[0].answer.sequence, 2u);
+  shade_all(2);
+  tick();
+  EXPECT_EQ(heard_.frames[first_].size(), frames + 1) << "refinements still make frames";
+  EXPECT_TRUE(heard_.frames[first_].back().edits.empty());
+}
+
+TEST_F(TileScheduler, AnswersEveryCameraOfAMovingView) {
+  open(ann_);
+  std::set<CameraSequence> answered;
+  std::size_t taken = 0;
+  for (CameraSequence s = 1; s <= 12; ++s) {
+    look(ann_, s, look_at({0.3 + 0.1 * double(s), 0.4, 1.5}, {-0.6, -0.2, -8}, 55));
+    shade_all(static_cast<std::uint32_t>(s));
+    tick();
+    auto& frames = heard_.frames[first_];
+    for (; taken < frames.size(); ++taken)
+      for (const auto& a : frames[taken].answers) answered.insert(a.sequence);
+    finish_frame(first_);
+  }
+  for (const auto& n : heard_.no_changes) answered.insert(n.answer.sequence);
+  for (const auto& a : heard_.frames[first_].back().answers) answered.insert(a.sequence);
+  for (CameraSequence s = 1; s <= 11; ++s) EXPECT_TRUE(answered.contains(s)) << s;
+}
+
+TEST_F(TileScheduler, AKeyFrameHoldsTheWholeTable) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  finish_frame(first_);
+  shade_all(1);
+  tick();
+  const auto resident = heard_.frames[first_].back().edits.size();
+  finish_frame(first_);
+  scheduler_.tell(KeyFrameWanted(ann_));
+  system_.run_until_idle();
+  const auto& key = heard_.frames[first_].back();
+  EXPECT_TRUE(key.key);
+  EXPECT_GE(key.edits.size(), resident);
+  EXPECT_EQ(key.writes.size(), key.edits.size());
+}
+
+TEST_F(TileScheduler, JoinsTheWorkOfAllSessionsAndForgetsAClosedOne) {
+  const SessionId bob{2};
+  open(ann_);
+  open(bob);
+  look(ann_, 1, ahead_);
+  const auto anns = heard_.work.back().work->size();
+  look(bob, 1, aside_);
+  EXPECT_GT(heard_.work.back().work->size(), anns);
+  scheduler_.tell(SessionClosed(bob));
+  system_.run_until_idle();
+  EXPECT_EQ(heard_.work.back().work->size(), anns);
+  EXPECT_EQ(heard_.encoders, std::set<StreamId>{first_});
+  EXPECT_TRUE(heard_.receivers[StreamId{2}].empty());
+}
+
+TEST_F(TileScheduler, ASessionThatClosesWhileItsViewIsTracedLeavesNothingBehind) {
+  open(ann_);
+  scheduler_.tell(ViewChanged(ann_, 1, ahead_, Viewport{160, 90}, FrameStamps{}));
+  scheduler_.tell(SessionClosed(ann_));
+  system_.run_until_idle();
+  for (int i = 0; i < 5; ++i) tick();
+  EXPECT_TRUE(heard_.frames[first_].empty());
+  EXPECT_TRUE(heard_.encoders.empty());
+  ASSERT_FALSE(heard_.work.empty());
+  EXPECT_TRUE(heard_.work.back().work->empty());
+  look(ann_, 2, ahead_);
+  EXPECT_TRUE(heard_.frames[first_].empty());
+}
+
+TEST_F(TileScheduler, AFailedFrameIsFollowedByAKeyFrame) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  finish_frame(first_, false);
+  ASSERT_EQ(heard_.frames[first_].size(), 2u);
+  EXPECT_TRUE(heard_.frames[first_].back().key);
+  EXPECT_EQ(heard_.frames[first_].back().answers.size(), 1u);
+}
+
+}  // namespace
+}  // namespace darm::tile_scheduler
