@@ -1,0 +1,384 @@
+#include "client/core/connection.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <charconv>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <mutex>
+#include <span>
+#include <thread>
+#include <utility>
+
+#include "proto/datagram.hpp"
+#include "proto/framing.hpp"
+#include "proto/limits.hpp"
+
+namespace darm::client {
+namespace {
+
+using std::chrono::milliseconds;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd = -1) : fd_(fd) {}
+  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+struct AddressList {
+  addrinfo* list = nullptr;
+  ~AddressList() {
+    if (list != nullptr) ::freeaddrinfo(list);
+  }
+};
+
+std::string errno_text() { return std::strerror(errno); }
+
+bool wait_for(int fd, short events, milliseconds timeout) {
+  pollfd p{fd, events, 0};
+  return ::poll(&p, 1, static_cast<int>(timeout.count())) > 0;
+}
+
+// Connects without blocking longer than `timeout`; leaves the socket non-blocking.
+Result<Descriptor> connect_to(const std::string& host, std::uint16_t port, milliseconds timeout) {
+  const std::string where = fmt::format("{}:{}", host, port);
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  AddressList found;
+  if (const int code = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found.list); code != 0) {
+    return fail(where + ": " + ::gai_strerror(code));
+  }
+  std::string reason = "no address";
+  for (const addrinfo* a = found.list; a != nullptr; a = a->ai_next) {
+    Descriptor fd(::socket(a->ai_family, a->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, a->ai_protocol));
+    if (fd.get() < 0) continue;
+    if (::connect(fd.get(), a->ai_addr, a->ai_addrlen) != 0 && errno != EINPROGRESS) {
+      reason = errno_text();
+      continue;
+    }
+    if (!wait_for(fd.get(), POLLOUT, timeout)) {
+      reason = "no answer in time";
+      continue;
+    }
+    int code = 0;
+    socklen_t size = sizeof(code);
+    ::getsockopt(fd.get(), SOL_SOCKET, SO_ERROR, &code, &size);
+    if (code != 0) {
+      reason = std::strerror(code);
+      continue;
+    }
+    const int on = 1;
+    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    return fd;
+  }
+  return fail(where + ": " + reason + "; is darmd serve running there?");
+}
+
+// UDP to the peer of a TCP socket, at another port.
+Descriptor udp_beside(int tcp, std::uint32_t port) {
+  sockaddr_storage peer{};
+  socklen_t size = sizeof(peer);
+  if (port == 0 || port > 65535 || ::getpeername(tcp, reinterpret_cast<sockaddr*>(&peer), &size) != 0)
+    return Descriptor();
+  const auto network_port = htons(static_cast<std::uint16_t>(port));
+  if (peer.ss_family == AF_INET) reinterpret_cast<sockaddr_in*>(&peer)->sin_port = network_port;
+  if (peer.ss_family == AF_INET6) reinterpret_cast<sockaddr_in6*>(&peer)->sin6_port = network_port;
+  Descriptor fd(::socket(peer.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (fd.get() < 0 || ::connect(fd.get(), reinterpret_cast<sockaddr*>(&peer), size) != 0) return Descriptor();
+  return fd;
+}
+
+std::string goodbye_text(const wire::Goodbye& g) {
+  std::string reason = wire::Goodbye::Reason_Name(g.reason());
+  if (reason.empty()) reason = "UNSPECIFIED";
+  std::string text = g.text().substr(0, proto::kMaxGoodbyeText);
+  std::replace_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32; }, ' ');
+  return "the server says goodbye: " + reason + (text.empty() ? "" : " (" + text + ")");
+}
+
+}  // namespace
+
+std::int64_t now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch()).count();
+}
+
+struct Connection::State {
+  ConnectOptions options;
+  Descriptor tcp, udp, wake;
+  wire::Welcome welcome;
+  std::optional<proto::SipKey> key;
+  std::uint64_t datagram_sequence = 0;
+  std::atomic<std::uint64_t> camera_sequence{0};
+  std::mutex send_mutex;  // TCP and UDP sending, sequences
+  bool said_goodbye = false;
+
+  std::mutex mutex;  // queue
+  std::condition_variable changed;
+  std::deque<Received> queue;
+  std::size_t queued_bytes = 0;
+  bool ended = false;
+  std::string end_reason;
+
+  std::atomic<std::uint64_t> received{0}, sent{0};
+  std::atomic<std::int64_t> last_sent_us{0};
+  std::atomic<bool> stopping{false};
+  std::thread reader;
+
+  Result<void> send_tcp(const wire::Envelope& envelope);
+  Result<void> send_body(wire::DatagramBody body);
+  void read_loop();
+  std::string read_some(proto::FrameReader& frames);
+  bool take(Received message);
+  void keep_alive();
+  void end(std::string reason);
+};
+
+Result<void> Connection::State::send_tcp(const wire::Envelope& envelope) {
+  const auto bytes = proto::frame(envelope);
+  const std::lock_guard lock(send_mutex);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const auto n = ::send(tcp.get(), bytes.data() + done, bytes.size() - done, MSG_NOSIGNAL);
+    if (n > 0) {
+      done += static_cast<std::size_t>(n);
+    } else if (n < 0 && errno == EINTR) {
+      continue;
+    } else if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+      // Half a message must not stay behind, so a full socket is waited for, but not for ever.
+      if (!wait_for(tcp.get(), POLLOUT, options.connect_timeout)) return fail("server: takes no more data");
+    } else {
+      return fail("server: connection lost: " + errno_text());
+    }
+  }
+  sent += bytes.size();
+  last_sent_us = now_us();
+  return {};
+}
+
+Result<void> Connection::State::send_body(wire::DatagramBody body) {
+  if (udp.get() >= 0 && key) {
+    const std::lock_guard lock(send_mutex);
+    const auto bytes = proto::seal_datagram(*key, welcome.session(), ++datagram_sequence, body);
+    // A lost datagram is replaced by the next one, so a failure to send is no error.
+    if (::send(udp.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) > 0) sent += bytes.size();
+    return {};
+  }
+  wire::Envelope envelope;
+  if (body.has_camera()) *envelope.mutable_camera() = std::move(*body.mutable_camera());
+  if (body.has_feedback()) *envelope.mutable_feedback() = std::move(*body.mutable_feedback());
+  return send_tcp(envelope);
+}
+
+void Connection::State::end(std::string reason) {
+  const std::lock_guard lock(mutex);
+  if (!ended) end_reason = std::move(reason);
+  ended = true;
+  changed.notify_all();
+}
+
+// Queues a message, waiting while the queue is full. False: stop reading.
+bool Connection::State::take(Received message) {
+  if (message.envelope.has_pong()) return true;
+  if (message.envelope.has_ping()) {
+    wire::Envelope pong;
+    pong.mutable_pong()->set_time_us(message.envelope.ping().time_us());
+    return send_tcp(pong).has_value();
+  }
+  if (message.envelope.has_goodbye()) {
+    end(goodbye_text(message.envelope.goodbye()));
+    return false;
+  }
+  std::unique_lock lock(mutex);
+  changed.wait(lock,
+               [&] { return stopping || queue.empty() || queued_bytes + message.bytes <= options.max_queued_bytes; });
+  if (stopping) return false;
+  queued_bytes += message.bytes;
+  queue.push_back(std::move(message));
+  changed.notify_all();
+  return true;
+}
+
+// TCP counts as life for the server only if something is sent now and then.
+void Connection::State::keep_alive() {
+  if (now_us() - last_sent_us < (proto::kPingEverySeconds - 2) * 1'000'000) return;
+  wire::Envelope ping;
+  ping.mutable_ping()->set_time_us(now_us());
+  if (auto ok = send_tcp(ping); !ok) end(ok.error().message);
+}
+
+// Reads what is there and queues whole messages; a reason to end, or empty.
+std::string Connection::State::read_some(proto::FrameReader& frames) {
+  std::array<std::uint8_t, 65536> buffer;
+  const auto n = ::recv(tcp.get(), buffer.data(), buffer.size(), 0);
+  if (n == 0) return "server: closed the connection";
+  if (n < 0) return errno == EAGAIN || errno == EINTR ? "" : "server: connection lost: " + errno_text();
+  received += static_cast<std::uint64_t>(n);
+  frames.feed(std::span(buffer.data(), static_cast<std::size_t>(n)));
+  for (;;) {
+    Received message;
+    const std::size_t before = frames.buffered();
+    const auto got = frames.next(message.envelope);
+    if (!got) return "server: " + got.error();
+    if (!*got) return {};
+    message.bytes = before - frames.buffered();
+    message.bytes_total = received - frames.buffered();
+    message.at_us = now_us();
+    if (!take(std::move(message))) return "connection is closed";
+  }
+}
+
+void Connection::State::read_loop() {
+  proto::FrameReader frames(proto::kMaxServerEnvelope);
+  std::int64_t last_heard = now_us();
+  while (!stopping) {
+    std::array<pollfd, 2> fds{{{tcp.get(), POLLIN, 0}, {wake.get(), POLLIN, 0}}};
+    const int ready = ::poll(fds.data(), fds.size(), 500);
+    if (stopping) break;
+    if (ready < 0 && errno != EINTR) return end("poll: " + errno_text());
+    if (fds[0].revents != 0) {
+      if (auto reason = read_some(frames); !reason.empty()) return end(std::move(reason));
+      last_heard = now_us();
+    } else if (now_us() - last_heard > options.silence_timeout.count() * 1000) {
+      return end("server: silent for too long");
+    }
+    keep_alive();
+  }
+  end("connection is closed");
+}
+
+Connection::Connection(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& options) {
+  auto tcp = connect_to(options.host, options.port, options.connect_timeout);
+  if (!tcp) return std::unexpected(tcp.error());
+  auto state = std::make_unique<State>();
+  state->options = options;
+  state->tcp = std::move(*tcp);
+  state->wake = Descriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  wire::Envelope envelope;
+  auto& hello = *envelope.mutable_hello();
+  hello.set_version(proto::kProtocolVersion);
+  hello.set_client(options.name.substr(0, proto::kMaxClientName));
+  if (options.view) *hello.mutable_pose() = to_pose(*options.view);
+  hello.set_max_phystex(options.max_phystex);
+  hello.set_chroma_444(options.chroma_444);
+  hello.set_lossless(options.lossless);
+  if (auto ok = state->send_tcp(envelope); !ok) return std::unexpected(ok.error());
+  std::unique_ptr<Connection> connection(new Connection(std::move(state)));
+  State& s = *connection->state_;
+  s.reader = std::thread([&s] { s.read_loop(); });
+
+  auto first = connection->next(options.handshake_timeout);
+  if (!first) return std::unexpected(first.error());
+  if (!*first) return fail("server: no welcome in time");
+  if (!(*first)->envelope.has_welcome()) return fail("server: its first message is not a welcome");
+  s.welcome = (*first)->envelope.welcome();
+  if (s.welcome.version() != proto::kProtocolVersion)
+    return fail(fmt::format("server: speaks protocol version {}, this client {}", s.welcome.version(),
+                            proto::kProtocolVersion));
+  s.key = proto::datagram_key(s.welcome.key());
+  if (s.key) s.udp = udp_beside(s.tcp.get(), s.welcome.udp_port());
+  return connection;
+}
+
+Connection::~Connection() {
+  goodbye();
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopping = true;
+    state_->changed.notify_all();
+  }
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = ::write(state_->wake.get(), &one, sizeof(one));
+  if (state_->reader.joinable()) state_->reader.join();
+}
+
+const wire::Welcome& Connection::welcome() const { return state_->welcome; }
+std::uint64_t Connection::bytes_received() const { return state_->received; }
+std::uint64_t Connection::bytes_sent() const { return state_->sent; }
+bool Connection::uses_udp() const { return state_->udp.get() >= 0; }
+
+Result<std::optional<Received>> Connection::next(milliseconds timeout) {
+  State& s = *state_;
+  std::unique_lock lock(s.mutex);
+  s.changed.wait_for(lock, timeout, [&] { return !s.queue.empty() || s.ended; });
+  if (!s.queue.empty()) {
+    std::optional<Received> message(std::move(s.queue.front()));
+    s.queue.pop_front();
+    s.queued_bytes -= message->bytes;
+    s.changed.notify_all();
+    return message;
+  }
+  if (s.ended) return fail(s.end_reason);
+  return std::optional<Received>();
+}
+
+Result<std::uint64_t> Connection::send_camera(const View& view) {
+  wire::DatagramBody body;
+  auto& camera = *body.mutable_camera();
+  const std::uint64_t sequence = ++state_->camera_sequence;
+  camera.set_sequence(sequence);
+  camera.set_client_time_us(now_us());
+  *camera.mutable_pose() = to_pose(view);
+  if (auto ok = state_->send_body(std::move(body)); !ok) return std::unexpected(ok.error());
+  return sequence;
+}
+
+Result<void> Connection::send_feedback(const wire::Feedback& feedback) {
+  if (feedback.key_frame_wanted()) {  // must not get lost
+    wire::Envelope envelope;
+    *envelope.mutable_feedback() = feedback;
+    return state_->send_tcp(envelope);
+  }
+  wire::DatagramBody body;
+  *body.mutable_feedback() = feedback;
+  return state_->send_body(std::move(body));
+}
+
+void Connection::goodbye() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (std::exchange(state_->said_goodbye, true) || state_->ended) return;
+  }
+  wire::Envelope envelope;
+  envelope.mutable_goodbye()->set_reason(wire::Goodbye::CLIENT_LEAVES);
+  if (state_->send_tcp(envelope)) ::shutdown(state_->tcp.get(), SHUT_WR);
+}
+
+Result<void> parse_address(const std::string& text, std::string& host, std::uint16_t& port) {
+  const auto colon = text.rfind(':');
+  const auto bad = [&] { return fail("--server " + text + ": expected HOST:PORT"); };
+  if (colon == std::string::npos || colon == 0) return bad();
+  host = text.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  const char* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, port);
+  if (parsed.ec != std::errc() || parsed.ptr != end || port == 0) return bad();
+  return {};
+}
+
+}  // namespace darm::client
