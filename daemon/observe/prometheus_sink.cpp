@@ -1,0 +1,174 @@
+#include "daemon/observe/prometheus_sink.hpp"
+
+#include <fmt/format.h>
+#include <prometheus/counter.h>
+#include <prometheus/exposer.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <shared_mutex>
+#include <unordered_map>
+#include <variant>
+
+namespace darm::observe {
+namespace {
+
+constexpr std::size_t kMaxSeries = 10'000;
+constexpr const char* kDropped = "darm_metric_series_dropped_total";
+
+using Metric = std::variant<prometheus::Counter*, prometheus::Gauge*, prometheus::Histogram*>;
+
+const prometheus::Histogram::BucketBoundaries& buckets_for(std::string_view name) {
+  static const prometheus::Histogram::BucketBoundaries seconds = {
+      0.00025, 0.0005, 0.001, 0.002, 0.003, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.05,
+      0.075,   0.1,    0.15,  0.2,   0.3,   0.5,   0.75,   1,    2,     5,    10,   60};
+  static const prometheus::Histogram::BucketBoundaries bytes = [] {
+    prometheus::Histogram::BucketBoundaries list;
+    for (double b = 256; b <= 1 << 30; b *= 4) list.push_back(b);
+    return list;
+  }();
+  static const prometheus::Histogram::BucketBoundaries other = [] {
+    prometheus::Histogram::BucketBoundaries list;
+    for (double b = 0.001; b <= 10'000; b *= 10)
+      for (const double step : {1.0, 2.0, 5.0}) list.push_back(b * step);
+    return list;
+  }();
+  if (name.ends_with("_seconds")) return seconds;
+  return name.ends_with("_bytes") ? bytes : other;
+}
+
+struct TextHash {
+  using is_transparent = void;
+  std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
+};
+
+// civetweb's listening_ports: an IPv6 address is written in brackets.
+std::string bind_address(const std::string& address, std::uint16_t port) {
+  return address.find(':') == std::string::npos ? fmt::format("{}:{}", address, port)
+                                                : fmt::format("[{}]:{}", address, port);
+}
+
+}  // namespace
+
+class PrometheusSink::Impl {
+ public:
+  // The series of `name` and `labels`, made if it is new; null if it cannot be.
+  template <class M, class Builder>
+  M* series(std::string_view name, runtime::Labels labels, Builder build) {
+    thread_local std::string key;
+    key.assign(name);
+    for (const auto& label : labels) key.append(1, '\0').append(label.key).append(1, '\0').append(label.value);
+    {
+      const std::shared_lock lock(mutex_);
+      if (const auto it = series_.find(std::string_view(key)); it != series_.end()) return as<M>(it->second, name);
+    }
+    const std::unique_lock lock(mutex_);
+    if (const auto it = series_.find(std::string_view(key)); it != series_.end()) return as<M>(it->second, name);
+    if (series_.size() >= kMaxSeries) {
+      dropped_.Increment();
+      return nullptr;
+    }
+    try {
+      std::map<std::string, std::string> label_map;
+      for (const auto& label : labels) label_map.emplace(label.key, label.value);
+      M* made = build(registry_, std::string(name), label_map);
+      series_.emplace(key, made);
+      return made;
+    } catch (const std::exception& e) {
+      complain(name, e.what());
+      return nullptr;
+    }
+  }
+
+  prometheus::Registry& registry() { return *registry_ptr_; }
+  const std::shared_ptr<prometheus::Registry>& shared_registry() const { return registry_ptr_; }
+
+  std::unique_ptr<prometheus::Exposer> exposer;
+  std::uint16_t port = 0;
+
+ private:
+  template <class M>
+  M* as(const Metric& metric, std::string_view name) {
+    if (auto* const* found = std::get_if<M*>(&metric)) return *found;
+    complain(name, "measured by two methods");
+    return nullptr;
+  }
+
+  void complain(std::string_view name, std::string_view what) {
+    if (!complained_.exchange(true)) spdlog::error("metric {}: {}; its measurements are dropped", name, what);
+  }
+
+  std::shared_ptr<prometheus::Registry> registry_ptr_ = std::make_shared<prometheus::Registry>();
+  prometheus::Registry& registry_ = *registry_ptr_;
+  prometheus::Counter& dropped_ = prometheus::BuildCounter()
+                                      .Name(kDropped)
+                                      .Help("Measurements of series over the limit")
+                                      .Register(registry_)
+                                      .Add({});
+  std::shared_mutex mutex_;
+  std::unordered_map<std::string, Metric, TextHash, std::equal_to<>> series_;
+  std::atomic<bool> complained_ = false;
+};
+
+PrometheusSink::PrometheusSink() : impl_(std::make_unique<Impl>()) {}
+PrometheusSink::~PrometheusSink() = default;
+
+Result<void> PrometheusSink::expose(const std::string& address, std::uint16_t port) {
+  const std::string where = bind_address(address, port);
+  try {
+    auto exposer = std::make_unique<prometheus::Exposer>(where, 2);
+    exposer->RegisterCollectable(impl_->shared_registry());
+    const auto ports = exposer->GetListeningPorts();
+    if (ports.empty() || ports.front() <= 0) return fail(where + ": metrics cannot be served there");
+    impl_->port = static_cast<std::uint16_t>(ports.front());
+    impl_->exposer = std::move(exposer);
+    return {};
+  } catch (const std::exception&) {
+    return fail(where + ": metrics cannot be served there; is the port taken? set listen.metrics_port (-1: off)");
+  }
+}
+
+std::uint16_t PrometheusSink::port() const { return impl_->port; }
+
+std::string PrometheusSink::text() const { return prometheus::TextSerializer().Serialize(impl_->registry().Collect()); }
+
+void PrometheusSink::count(std::string_view name, double n, runtime::Labels labels) {
+  auto* counter =
+      impl_->series<prometheus::Counter>(name, labels, [](auto& registry, const std::string& full, const auto& map) {
+        return &prometheus::BuildCounter().Name(full).Register(registry).Add(map);
+      });
+  if (counter != nullptr && n > 0 && std::isfinite(n)) counter->Increment(n);
+}
+
+void PrometheusSink::observe(std::string_view name, double value, runtime::Labels labels) {
+  auto* histogram =
+      impl_->series<prometheus::Histogram>(name, labels, [](auto& registry, const std::string& full, const auto& map) {
+        return &prometheus::BuildHistogram().Name(full).Register(registry).Add(map, buckets_for(full));
+      });
+  if (histogram != nullptr && std::isfinite(value)) histogram->Observe(value);
+}
+
+void PrometheusSink::set(std::string_view name, double value, runtime::Labels labels) {
+  auto* gauge =
+      impl_->series<prometheus::Gauge>(name, labels, [](auto& registry, const std::string& full, const auto& map) {
+        return &prometheus::BuildGauge().Name(full).Register(registry).Add(map);
+      });
+  if (gauge != nullptr) gauge->Set(value);
+}
+
+Health::Health(runtime::MetricSink& sink, std::string_view version) : sink_(sink) {
+  sink_.set("darm_build_info", 1, {{"version", version}});
+  set_ready(false);
+}
+
+void Health::set_ready(bool ready) { sink_.set("darm_ready", ready ? 1 : 0); }
+
+}  // namespace darm::observe
