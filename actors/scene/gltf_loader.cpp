@@ -73,6 +73,7 @@ class SceneBuilder {
   void recentre();
   Result<void> take_images();
   void drop_unused_materials();
+  [[nodiscard]] std::string dropped_list() const;
 
   Document& document_;
   std::shared_ptr<Scene> scene_ = std::make_shared<Scene>();
@@ -233,6 +234,14 @@ Result<void> SceneBuilder::take_images() {
   return {};
 }
 
+/// " (12 dropped: zero area)" or nothing.
+std::string SceneBuilder::dropped_list() const {
+  std::string list;
+  for (const auto& [reason, count] : document_.dropped)
+    list += (list.empty() ? " (" : "; ") + std::to_string(count) + " dropped: " + reason;
+  return list.empty() ? list : list + ")";
+}
+
 Result<std::shared_ptr<const Scene>> SceneBuilder::build(const LightSetup& setup) {
   if (auto ok = gltf::check_images(document_); !ok) return std::unexpected(ok.error());
   auto materials = gltf::read_materials(document_);
@@ -251,7 +260,7 @@ Result<std::shared_ptr<const Scene>> SceneBuilder::build(const LightSetup& setup
     document_.warnings.push_back(std::to_string(points_and_lines_) +
                                  " primitives of points or lines have no surface and are left out");
   }
-  if (pending_.empty()) return fail("has no triangles to show");
+  if (pending_.empty()) return fail("has no triangles to show" + dropped_list());
   recentre();
   drop_unused_materials();
   if (auto ok = take_images(); !ok) return std::unexpected(ok.error());

@@ -52,4 +52,10 @@ struct LightSetup {
 [[nodiscard]] Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& path,
                                                               const LightSetup& setup, const LoadLimits& limits = {});
 
+/// The same for a file that is in memory already; `name` stands for it in messages. It may not refer to other files.
+[[nodiscard]] Result<std::shared_ptr<const Scene>> load_scene_from_memory(std::span<const std::uint8_t> bytes,
+                                                                          const std::string& name,
+                                                                          const LightSetup& setup,
+                                                                          const LoadLimits& limits = {});
+
 }  // namespace darm::scene
