@@ -31,7 +31,7 @@ std::vector<std::string> faults_of(const std::string& toml) {
 std::string with_examples() {
   std::istringstream in(text_of(kDocumented));
   std::string all;
-  const std::regex example(R"(^# (\[.*\]|[a-z_]+ = .*)$)");
+  const std::regex example(R"(^# (\[.*\]|[a-z_0-9]+ = .*)$)");
   for (std::string line; std::getline(in, line);) {
     std::smatch match;
     all += (std::regex_match(line, match, example) ? match[1].str() : line) + "\n";
@@ -98,8 +98,8 @@ TEST(DocumentedConfig, MentionsEveryKey) {
   std::istringstream in(with_examples());
   std::string section;
   std::vector<std::string> mentioned;
-  const std::regex header(R"(^\[?\[([a-z_]+)\]\]?$)");
-  const std::regex key(R"(^([a-z_]+) = .*$)");
+  const std::regex header(R"(^\[?\[([a-z_0-9]+)\]\]?$)");
+  const std::regex key(R"(^([a-z_0-9]+) = .*$)");
   for (std::string line; std::getline(in, line);) {
     std::smatch match;
     if (std::regex_match(line, match, header)) section = match[1].str() + (line.starts_with("[[") ? "[]." : ".");

@@ -1,0 +1,111 @@
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <string>
+#include <thread>
+
+#include "daemon/observe/log.hpp"
+#include "daemon/observe/prometheus_sink.hpp"
+
+namespace darm::observe {
+namespace {
+
+// The answer to GET /metrics on a local port.
+std::string fetch(std::uint16_t port) {
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::string answer;
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+    const std::string request = "GET /metrics HTTP/1.0\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+    (void)!send(fd, request.data(), request.size(), MSG_NOSIGNAL);
+    char buffer[4096];
+    for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;)
+      answer.append(buffer, static_cast<std::size_t>(n));
+  }
+  close(fd);
+  return answer;
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(PrometheusSinkTest, CountersGaugesAndHistogramsAreShown) {
+  PrometheusSink sink;
+  sink.count("darm_frames_total", 2, {{"stream", "1"}});
+  sink.count("darm_frames_total", 3, {{"stream", "1"}});
+  sink.set("darm_sessions", 4, {});
+  sink.observe("darm_encode_seconds", 0.004, {});
+  const std::string text = sink.text();
+  EXPECT_TRUE(has(text, "darm_frames_total{stream=\"1\"} 5")) << text;
+  EXPECT_TRUE(has(text, "darm_sessions 4")) << text;
+  EXPECT_TRUE(has(text, "darm_encode_seconds_bucket{le=\"0.005\"} 1")) << text;
+  EXPECT_TRUE(has(text, "darm_encode_seconds_bucket{le=\"0.003\"} 0")) << text;
+}
+
+TEST(PrometheusSinkTest, NonsenseIsDroppedNotThrown) {
+  PrometheusSink sink;
+  sink.count("darm_a_total", 1, {});
+  sink.set("darm_a_total", 7, {});     // another method
+  sink.count("not a name!", 1, {});    // not a metric name
+  sink.count("darm_a_total", -5, {});  // counters do not fall
+  sink.observe("darm_b_seconds", 0.0 / 0.0, {});
+  EXPECT_TRUE(has(sink.text(), "darm_a_total 1")) << sink.text();
+  EXPECT_TRUE(has(sink.text(), "darm_b_seconds_count 0")) << sink.text();
+}
+
+TEST(PrometheusSinkTest, SeriesAreBounded) {
+  PrometheusSink sink;
+  for (int i = 0; i < 10'100; ++i) sink.count("darm_x_total", 1, {{"id", std::to_string(i)}});
+  EXPECT_TRUE(has(sink.text(), "darm_metric_series_dropped_total 100"));
+}
+
+TEST(PrometheusSinkTest, ThreadsMayMeasureAtOnce) {
+  PrometheusSink sink;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&sink] {
+      for (int i = 0; i < 1000; ++i) sink.count("darm_y_total", 1, {{"k", std::to_string(i % 10)}});
+    });
+  for (auto& thread : threads) thread.join();
+  EXPECT_TRUE(has(sink.text(), "darm_y_total{k=\"3\"} 400"));
+}
+
+TEST(PrometheusSinkTest, ServesOverHttpOnAnyFreePort) {
+  PrometheusSink sink;
+  Health health(sink, "1.2.3");
+  health.set_ready(true);
+  const auto exposed = sink.expose("127.0.0.1", 0);
+  ASSERT_TRUE(exposed) << exposed.error().message;
+  EXPECT_GT(sink.port(), 0);
+  const std::string answer = fetch(sink.port());
+  EXPECT_TRUE(has(answer, "200 OK")) << answer;
+  EXPECT_TRUE(has(answer, "darm_ready 1")) << answer;
+  EXPECT_TRUE(has(answer, "darm_build_info{version=\"1.2.3\"} 1")) << answer;
+}
+
+TEST(PrometheusSinkTest, TakenPortIsAnErrorThatNamesIt) {
+  PrometheusSink first;
+  ASSERT_TRUE(first.expose("127.0.0.1", 0));
+  PrometheusSink second;
+  const auto exposed = second.expose("127.0.0.1", first.port());
+  ASSERT_FALSE(exposed);
+  EXPECT_TRUE(has(exposed.error().message, "127.0.0.1:" + std::to_string(first.port()))) << exposed.error().message;
+  EXPECT_FALSE(PrometheusSink().expose("no such address", 0));
+}
+
+TEST(LogTest, MessagesCannotBreakOutOfTheirJsonString) {
+  EXPECT_EQ(json_escaped("a\"b\\c\nd"), "a\\\"b\\\\c\\u000ad");
+  EXPECT_EQ(json_escaped("gr\xc3\xbc\xc3\x9f"), "gr\xc3\xbc\xc3\x9f");
+  EXPECT_EQ(json_escaped("\xff\xc3"), "\\ufffd\\ufffd");
+  EXPECT_EQ(json_escaped("\xed\xa0\x80"), "\\ufffd\\ufffd\\ufffd");
+  set_up_log("debug", true);
+  set_up_log("nonsense", false);
+}
+
+}  // namespace
+}  // namespace darm::observe
