@@ -1,0 +1,147 @@
+#include "client/probe/camera_path.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+
+namespace darm::client::probe {
+namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = 16u << 20;
+constexpr std::size_t kMaxKeys = 100000;
+
+bool valid(const CameraKey& k) {
+  const double sum = k.t + k.position.x + k.position.y + k.position.z + k.target.x + k.target.y + k.target.z + k.fovy;
+  return std::isfinite(sum) && k.fovy >= 0.1 && k.fovy <= 179;
+}
+
+std::optional<glm::dvec3> parse_vec(const std::string& text) {
+  std::istringstream in(text);
+  glm::dvec3 v;
+  char comma1 = 0, comma2 = 0;
+  if (!(in >> v.x >> comma1 >> v.y >> comma2 >> v.z) || comma1 != ',' || comma2 != ',' || in.peek() != EOF)
+    return std::nullopt;
+  return v;
+}
+
+std::optional<CameraKey> parse_spec(const std::string& spec) {
+  std::istringstream in(spec);
+  std::string position, target, rest;
+  CameraKey key;
+  if (!(in >> position >> target >> key.fovy) || (in >> rest)) return std::nullopt;
+  const auto p = parse_vec(position), t = parse_vec(target);
+  if (!p || !t) return std::nullopt;
+  key.position = *p;
+  key.target = *t;
+  return valid(key) ? std::optional(key) : std::nullopt;
+}
+
+std::optional<glm::dvec3> toml_vec(const toml::table& table, const char* name) {
+  const auto* array = table[name].as_array();
+  if (array == nullptr || array->size() != 3) return std::nullopt;
+  std::array<double, 3> v{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto n = (*array)[i].value<double>();
+    if (!n) return std::nullopt;
+    v[i] = *n;
+  }
+  return glm::dvec3(v[0], v[1], v[2]);
+}
+
+}  // namespace
+
+Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::path& setup) {
+  if (const auto key = parse_spec(spec)) return *key;
+  if (setup.empty())
+    return fail("--camera " + spec + ": expected \"px,py,pz tx,ty,tz fovy\", or a name together with --setup FILE");
+  toml::table table;
+  try {  // toml++ reports faults of the file by exception
+    table = toml::parse_file(setup.string());
+  } catch (const toml::parse_error& e) {
+    return fail(setup.string() + ": " + std::string(e.description()));
+  }
+  std::string known;
+  if (const auto* cameras = table["cameras"].as_array()) {
+    for (const auto& node : *cameras) {
+      const auto* camera = node.as_table();
+      if (camera == nullptr) continue;
+      const std::string name = (*camera)["name"].value_or(std::string());
+      known += (known.empty() ? "" : ", ") + name;
+      if (name != spec) continue;
+      const auto position = toml_vec(*camera, "position"), target = toml_vec(*camera, "target");
+      const CameraKey key{0, position.value_or(glm::dvec3(0)), target.value_or(glm::dvec3(0)),
+                          (*camera)["fovy"].value_or(60.0)};
+      if (!position || !target || !valid(key))
+        return fail(setup.string() + ": camera " + name + " needs position, target and fovy");
+      return key;
+    }
+  }
+  return fail(setup.string() + ": no camera " + spec + " (there are: " + known + ")");
+}
+
+Result<std::vector<CameraKey>> read_walkthrough(const std::filesystem::path& file) {
+  std::error_code code;
+  const auto size = std::filesystem::file_size(file, code);
+  if (code) return fail(file.string() + ": " + code.message());
+  if (size > kMaxFileBytes) return fail(file.string() + ": is too large for a walkthrough");
+  std::ifstream in(file);
+  const auto json = nlohmann::json::parse(in, nullptr, false);
+  if (!json.is_array() || json.size() < 2 || json.size() > kMaxKeys)
+    return fail(file.string() + ": expected a JSON list of at least two cameras");
+  std::vector<CameraKey> path;
+  for (const auto& entry : json) {
+    const auto vec = [&](const char* name) -> std::optional<glm::dvec3> {
+      if (!entry.is_object() || !entry.contains(name)) return std::nullopt;
+      const auto& a = entry[name];
+      if (!a.is_array() || a.size() != 3 ||
+          !std::all_of(a.begin(), a.end(), [](const auto& n) { return n.is_number(); }))
+        return std::nullopt;
+      return glm::dvec3(a[0].template get<double>(), a[1].template get<double>(), a[2].template get<double>());
+    };
+    const auto number = [&](const char* name) {
+      return entry.is_object() && entry.contains(name) && entry[name].is_number() ? entry[name].template get<double>()
+                                                                                  : NAN;
+    };
+    const auto position = vec("position"), target = vec("target");
+    const CameraKey key{number("t"), position.value_or(glm::dvec3(NAN)), target.value_or(glm::dvec3(NAN)),
+                        number("fovy")};
+    if (!valid(key) || (!path.empty() && key.t <= path.back().t)) {
+      return fail(fmt::format("{}: entry {} needs a rising t, position, target and fovy", file.string(), path.size()));
+    }
+    path.push_back(key);
+  }
+  return path;
+}
+
+CameraKey camera_at(const std::vector<CameraKey>& path, double t) {
+  if (t <= path.front().t) return path.front();
+  if (t >= path.back().t) return path.back();
+  const auto upper =
+      std::upper_bound(path.begin(), path.end(), t, [](double value, const CameraKey& k) { return value < k.t; });
+  const auto i = static_cast<std::size_t>(upper - path.begin()) - 1;
+  const CameraKey &a = path[i], &b = path[i + 1];
+  const CameraKey &before = path[i > 0 ? i - 1 : 0], &after = path[std::min(i + 2, path.size() - 1)];
+  const double span = b.t - a.t, s = (t - a.t) / span;
+  const double h00 = (1 + 2 * s) * (1 - s) * (1 - s), h10 = s * (1 - s) * (1 - s), h01 = s * s * (3 - 2 * s),
+               h11 = s * s * (s - 1);
+  const double scale_a = span / std::max(b.t - before.t, 1e-9), scale_b = span / std::max(after.t - a.t, 1e-9);
+  const auto curve = [&](const auto& pa, const auto& pb, const auto& p0, const auto& p3) {
+    return pa * h00 + (pb - p0) * (scale_a * h10) + pb * h01 + (p3 - pa) * (scale_b * h11);
+  };
+  return {t, curve(a.position, b.position, before.position, after.position),
+          curve(a.target, b.target, before.target, after.target),
+          std::clamp(curve(a.fovy, b.fovy, before.fovy, after.fovy), 0.1, 179.0)};
+}
+
+View to_view(const CameraKey& key, std::uint32_t width, std::uint32_t height) {
+  return look_at(key.position, key.target, key.fovy, width, height);
+}
+
+}  // namespace darm::client::probe

@@ -1,0 +1,29 @@
+// Where the probe looks: a camera given in words, a named one of a set-up file, or a walkthrough over time.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/core/result.hpp"
+#include "client/core/view.hpp"
+
+namespace darm::client::probe {
+
+struct CameraKey {
+  double t = 0;  ///< seconds
+  glm::dvec3 position{0.0};
+  glm::dvec3 target{0, 0, -1};
+  double fovy = 60;  ///< degrees
+};
+
+/// `spec`: "px,py,pz tx,ty,tz fovy_degrees", or the name of a [[cameras]] entry of the TOML file `setup` (may be
+/// empty).
+[[nodiscard]] Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::path& setup);
+/// JSON list of {"t", "position", "target", "fovy"}, times rising, at least two.
+[[nodiscard]] Result<std::vector<CameraKey>> read_walkthrough(const std::filesystem::path& file);
+/// Cubic Hermite with central-difference tangents (Catmull-Rom with uneven times); held at both ends.
+[[nodiscard]] CameraKey camera_at(const std::vector<CameraKey>& path, double t);
+[[nodiscard]] View to_view(const CameraKey& key, std::uint32_t width, std::uint32_t height);
+
+}  // namespace darm::client::probe

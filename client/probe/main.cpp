@@ -1,0 +1,191 @@
+// darm-probe: connects as a client, draws without a window, compares with a reference, reports.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+
+#include "client/core/egl_context.hpp"
+#include "client/probe/camera_path.hpp"
+#include "client/probe/probe_session.hpp"
+#include "client/probe/report.hpp"
+
+namespace darm::client::probe {
+namespace {
+
+struct Arguments {
+  std::string server, camera, setup, size = "1280x720", walkthrough, reference, out, ceiling;
+  double until_error = -1, seconds = -1, ceiling_seconds = 0, series_interval = 0, updates_per_second = 10;
+  std::uint32_t phystex = 2048, ceiling_phystex = 8192;
+  unsigned bench_draw = 0;
+  bool lossless = false, no_444 = false, json = false;
+};
+
+Result<Reference> read_reference(const std::string& file) {
+  std::filesystem::path base(file);
+  if (base.extension() == ".pfm") base.replace_extension();
+  auto a = read_pfm(base.string() + ".a.pfm");
+  if (!a) return std::unexpected(a.error());
+  auto b = read_pfm(base.string() + ".b.pfm");
+  if (!b) return std::unexpected(b.error());
+  return Reference{std::move(*a), std::move(*b)};
+}
+
+std::vector<double> draw_times(const Arguments& a, double seconds) {
+  std::vector<double> times;
+  if (a.series_interval > 0) {
+    for (double t = a.series_interval; t < seconds && times.size() < 10000; t += a.series_interval) times.push_back(t);
+  } else if (a.walkthrough.empty()) {
+    for (const double t : {1, 2, 5, 10, 20, 30, 60, 120, 300, 600}) {
+      if (t < seconds) times.push_back(t);
+    }
+  }
+  return times;
+}
+
+Result<SessionPlan> make_plan(const Arguments& a) {
+  SessionPlan plan;
+  if (auto ok = parse_address(a.server, plan.host, plan.port); !ok) return std::unexpected(ok.error());
+  unsigned width = 0, height = 0;
+  char rest = 0;
+  if (std::sscanf(a.size.c_str(), "%ux%u%c", &width, &height, &rest) != 2 || width < 1 || height < 1 || width > 8192 ||
+      height > 8192) {
+    return fail("--size " + a.size + ": expected WIDTHxHEIGHT, 1 to 8192 each");
+  }
+  plan.width = width;
+  plan.height = height;
+  plan.updates_per_second = a.updates_per_second;
+  plan.seconds = a.seconds;
+  if (a.until_error >= 0) {
+    plan.until_error = a.until_error;
+    if (a.seconds < 0) plan.seconds = 120;
+  }
+  if (!a.walkthrough.empty()) {
+    auto path = read_walkthrough(a.walkthrough);
+    if (!path) return std::unexpected(path.error());
+    plan.path = std::move(*path);
+    if (plan.seconds < 0) plan.seconds = plan.path.back().t - plan.path.front().t;
+  } else {
+    if (a.camera.empty()) return fail("--camera or --walkthrough is needed");
+    auto key = read_camera(a.camera, a.setup);
+    if (!key) return std::unexpected(key.error());
+    plan.path = {*key};
+  }
+  if (plan.seconds < 0) plan.seconds = 10;
+  plan.draw_times = draw_times(a, plan.seconds);
+  plan.max_phystex = a.phystex;
+  plan.lossless = a.lossless;
+  plan.chroma_444 = !a.no_444;
+  return plan;
+}
+
+// The same view without codec and with every tile resident: from the cache file, or from a session of its own.
+Result<Image8> ceiling_picture(const Arguments& a, SessionPlan plan) {
+  if (!a.ceiling.empty() && std::filesystem::exists(a.ceiling)) return read_png(a.ceiling);
+  if (a.ceiling_seconds <= 0) return fail(a.ceiling + ": is not there yet; --ceiling-seconds S makes it");
+  plan.path = {camera_at(plan.path, plan.path.front().t + plan.seconds)};
+  plan.seconds = a.ceiling_seconds;
+  plan.until_error.reset();
+  plan.draw_times.clear();
+  plan.lossless = true;
+  plan.max_phystex = a.ceiling_phystex;
+  auto session = run_session(plan, nullptr, 0);
+  if (!session) return fail("ceiling: " + session.error().message);
+  if (!a.ceiling.empty()) {
+    if (auto ok = write_png(a.ceiling, session->picture); !ok) return std::unexpected(ok.error());
+  }
+  return std::move(session->picture);
+}
+
+Result<void> run(const Arguments& a) {
+  auto plan = make_plan(a);
+  if (!plan) return std::unexpected(plan.error());
+  std::optional<Reference> reference;
+  Outcome outcome;
+  if (!a.reference.empty()) {
+    auto read = read_reference(a.reference);
+    if (!read) return std::unexpected(read.error());
+    reference = std::move(*read);
+    if (reference->a.width != plan->width || reference->a.height != plan->height) {
+      return fail(
+          fmt::format("{}: is {}x{}, the picture {}", a.reference, reference->a.width, reference->a.height, a.size));
+    }
+    const auto own = reference_psnr(*reference);
+    if (!own) return std::unexpected(own.error());
+    outcome.reference_psnr = *own;
+  }
+  auto context = EglContext::create();
+  if (!context) return std::unexpected(context.error());
+  auto session = run_session(*plan, reference ? &*reference : nullptr, a.bench_draw);
+  if (!session) return std::unexpected(session.error());
+  outcome.session = std::move(*session);
+  outcome.benched = a.bench_draw > 0;
+  if (!a.out.empty()) {
+    if (auto ok = write_png(a.out, outcome.session.picture); !ok) return ok;
+  }
+  if (reference) {
+    const auto score = compare(outcome.session.picture, *reference);
+    if (!score) return std::unexpected(score.error());
+    outcome.score = *score;
+  }
+  if (a.ceiling_seconds > 0 || !a.ceiling.empty()) {
+    const auto ceiling = ceiling_picture(a, *plan);
+    if (!ceiling) return std::unexpected(ceiling.error());
+    if (!a.out.empty()) {
+      if (auto ok = write_png(a.out + ".ceiling.png", *ceiling); !ok) return ok;
+    }
+    if (reference) {
+      const auto score = compare(*ceiling, *reference);
+      if (!score) return std::unexpected(Error("ceiling: " + score.error().message));
+      outcome.ceiling = *score;
+    }
+  }
+  std::cout << (a.json ? to_json(outcome) + "\n" : to_text(outcome)) << std::flush;
+  return {};
+}
+
+void declare(CLI::App& app, Arguments& a) {
+  app.add_option("--server", a.server, "HOST:PORT of darmd's TCP port")->required();
+  app.add_option("--camera", a.camera, "\"px,py,pz tx,ty,tz fovy_degrees\", or a name of --setup");
+  app.add_option("--setup", a.setup, "set-up file with [[cameras]], e.g. config/scenes/sponza.toml");
+  app.add_option("--walkthrough", a.walkthrough,
+                 "JSON list of {t, position, target, fovy}; begins at the first full image");
+  app.add_option("--size", a.size, "picture, WIDTHxHEIGHT")->capture_default_str();
+  app.add_option("--seconds", a.seconds,
+                 "stop after so long (default 10, a walkthrough's length; the limit of --until-error: 120)");
+  app.add_option("--until-error", a.until_error,
+                 "stop once the server's estimated RMS display error is at most this, 0..1");
+  app.add_option("--reference", a.reference, "BASE.pfm with its halves BASE.a.pfm and BASE.b.pfm beside it");
+  app.add_option("--ceiling-seconds", a.ceiling_seconds,
+                 "then open a lossless session at the same camera for so long and score it as the ceiling");
+  app.add_option("--ceiling-phystex", a.ceiling_phystex, "PhysTex of that session, pixels")->capture_default_str();
+  app.add_option("--ceiling", a.ceiling, "picture of the ceiling: read if it is there, else written");
+  app.add_flag("--lossless", a.lossless, "stream without codec (the server must allow it)");
+  app.add_flag("--no-444", a.no_444, "do not offer 4:4:4 chroma");
+  app.add_option("--phystex", a.phystex, "largest PhysTex to accept, pixels")->capture_default_str();
+  app.add_option("--updates-per-second", a.updates_per_second, "cameras sent, also when still")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 240.0));
+  app.add_option("--series-interval", a.series_interval,
+                 "seconds between points of the series (default: 1, 2, 5, 10, 20, 30, 60, ...)");
+  app.add_option("--bench-draw", a.bench_draw, "draw so many pictures at the end to measure frames/s");
+  app.add_option("--out", a.out, "PNG of the last picture");
+  app.add_flag("--json", a.json, "report as JSON on standard output");
+}
+
+}  // namespace
+}  // namespace darm::client::probe
+
+int main(int argc, char** argv) {
+  using namespace darm::client::probe;
+  CLI::App app("darm-probe: connect to darmd as a client, draw without a window, measure");
+  Arguments arguments;
+  declare(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  if (const auto done = run(arguments); !done) {
+    std::cerr << "darm-probe: " << done.error().message << "\n";
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,64 @@
+// One session with a server: cameras out, scene and frames in, pictures drawn at set times, everything measured.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/core/connection.hpp"
+#include "client/core/image_metrics.hpp"
+#include "client/core/renderer_gles.hpp"
+#include "client/probe/camera_path.hpp"
+
+namespace darm::client::probe {
+
+struct SessionPlan {
+  std::string host;
+  std::uint16_t port = 0;
+  std::vector<CameraKey> path;  ///< one entry: a still camera; more: a walkthrough, begun at the first image
+  std::uint32_t width = 1280, height = 720;
+  double updates_per_second = 10;
+  double seconds = 60;                ///< longest time, from the connection (still) or the first image (walkthrough)
+  std::optional<double> until_error;  ///< stop once the server's estimate is at or under this
+  std::vector<double> draw_times;     ///< seconds from the connection, rising; a point of the series each
+  std::uint32_t max_phystex = 2048;
+  bool lossless = false;
+  bool chroma_444 = true;
+};
+
+struct SeriesPoint {
+  double t = 0;
+  std::optional<double> psnr;
+  double error = 0;  ///< the server's estimate at that time
+};
+
+struct SessionReport {
+  Image8 picture;             ///< the last drawn
+  ResidencyCounts residency;  ///< of that picture
+  double seconds = 0;
+  double seconds_to_first_image = 0;
+  std::uint64_t bytes_to_first_image = 0;
+  std::uint64_t bytes = 0, stream_bytes = 0, sent_bytes = 0;
+  double stream_seconds = 0;  ///< from the first image on
+  std::uint64_t stream_bytes_after_first_image = 0;
+  std::uint64_t frames = 0, key_frames = 0, no_changes = 0, answers = 0, cameras = 0, frames_lost = 0;
+  double error = 0;
+  std::vector<SeriesPoint> series;
+  std::map<std::string, std::vector<double>> latency_ms;
+  std::vector<double> draw_seconds;  ///< drawing and resolving, without reading back
+  std::uint64_t triangles = 0;
+  std::string device;  ///< the GL that drew
+  std::string server;
+  bool udp = false;
+  std::uint32_t phystex_size = 0;
+};
+
+/// Runs the plan in the current GL context. `reference` (may be null) gives the series its PSNR.
+/// `bench_draws` more pictures are drawn at the end for `draw_seconds`. Error: no full image came in time, the server
+/// left, or what it sent is not valid.
+[[nodiscard]] Result<SessionReport> run_session(const SessionPlan& plan, const Reference* reference,
+                                                unsigned bench_draws);
+
+}  // namespace darm::client::probe

@@ -1,0 +1,108 @@
+#include "client/probe/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace darm::client::probe {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double percentile(std::vector<double> v, double p) {
+  std::sort(v.begin(), v.end());
+  return v[static_cast<std::size_t>(std::lround(p * static_cast<double>(v.size() - 1)))];
+}
+
+double share(std::uint64_t part, std::uint64_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+template <class T>
+Json optional(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+double frames_per_second(const SessionReport& s) {
+  double sum = 0;
+  for (const double d : s.draw_seconds) sum += d;
+  return sum > 0 ? static_cast<double>(s.draw_seconds.size()) / sum : 0.0;
+}
+
+double mbit_per_second(const SessionReport& s) {
+  return s.stream_seconds > 0 ? static_cast<double>(s.stream_bytes_after_first_image) * 8e-6 / s.stream_seconds : 0.0;
+}
+
+}  // namespace
+
+std::string to_json(const Outcome& o) {
+  const SessionReport& s = o.session;
+  Json j;
+  j["psnr"] = o.score ? Json(o.score->psnr) : Json(nullptr);
+  j["mssim"] = o.score ? Json(o.score->mssim) : Json(nullptr);
+  j["ceiling_psnr"] = o.ceiling ? Json(o.ceiling->psnr) : Json(nullptr);
+  j["ceiling_mssim"] = o.ceiling ? Json(o.ceiling->mssim) : Json(nullptr);
+  j["reference_psnr"] = optional(o.reference_psnr);
+  j["rmse"] = o.score ? Json(o.score->rmse) : Json(nullptr);
+  j["error"] = s.error;
+  j["seconds_to_first_image"] = s.seconds_to_first_image;
+  j["bytes_to_first_image"] = s.bytes_to_first_image;
+  j["sharp_fraction"] = share(s.residency.sharp, s.residency.samples);
+  j["coarser_fraction"] = share(s.residency.coarser, s.residency.samples);
+  j["coarse_fraction"] = share(s.residency.coarse_tex, s.residency.samples);
+  j["background_fraction"] = share(s.residency.background, s.residency.samples);
+  j["frames"] = s.frames;
+  j["key_frames"] = s.key_frames;
+  j["frames_lost"] = s.frames_lost;
+  j["no_changes"] = s.no_changes;
+  j["cameras"] = s.cameras;
+  j["answers"] = s.answers;
+  j["seconds"] = s.seconds;
+  j["bytes"] = s.bytes;
+  j["stream_bytes"] = s.stream_bytes;
+  j["sent_bytes"] = s.sent_bytes;
+  j["mbit_per_second"] = mbit_per_second(s);
+  j["fps"] = frames_per_second(s);
+  j["triangles"] = s.triangles;
+  j["device"] = s.device;
+  j["server"] = s.server;
+  j["phystex_size"] = s.phystex_size;
+  j["udp"] = s.udp;
+  Json latency = Json::object();
+  for (const auto& [stage, values] : s.latency_ms)
+    latency[stage] = {{"p50", percentile(values, 0.5)}, {"p99", percentile(values, 0.99)}};
+  j["latency_ms"] = latency;
+  j["series"] = Json::array();
+  for (const auto& p : s.series) j["series"].push_back({{"t", p.t}, {"psnr", optional(p.psnr)}, {"error", p.error}});
+  return j.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string to_text(const Outcome& o) {
+  const SessionReport& s = o.session;
+  std::string text;
+  if (o.score) text += fmt::format("PSNR {:.2f} dB, MSSIM {:.4f}", o.score->psnr, o.score->mssim);
+  if (o.ceiling) text += fmt::format(", ceiling {:.2f} dB, {:.4f}", o.ceiling->psnr, o.ceiling->mssim);
+  if (o.reference_psnr) text += fmt::format(", reference itself {:.2f} dB", *o.reference_psnr);
+  if (!text.empty()) text += "\n";
+  text += fmt::format(
+      "first full image after {:.2f} s and {:.2f} MB; {} frames, {} without change, {:.2f} Mbit/s, estimated error "
+      "{:.4f}\n",
+      s.seconds_to_first_image, static_cast<double>(s.bytes_to_first_image) / 1e6, s.frames, s.no_changes,
+      mbit_per_second(s), s.error);
+  text += fmt::format("sharp {:.1f} %, coarser {:.1f} %, CoarseTex {:.1f} %, background {:.1f} %\n",
+                      100 * share(s.residency.sharp, s.residency.samples),
+                      100 * share(s.residency.coarser, s.residency.samples),
+                      100 * share(s.residency.coarse_tex, s.residency.samples),
+                      100 * share(s.residency.background, s.residency.samples));
+  for (const auto& [stage, values] : s.latency_ms) {
+    text +=
+        fmt::format("{:>12}: p50 {:.1f} ms, p99 {:.1f} ms\n", stage, percentile(values, 0.5), percentile(values, 0.99));
+  }
+  text += fmt::format("{:.2f} frames/s on {}{}\n", frames_per_second(s), s.device,
+                      o.benched ? "" : " (few draws; --bench-draw measures)");
+  return text;
+}
+
+}  // namespace darm::client::probe
