@@ -8,7 +8,7 @@ namespace darm::tile_scheduler {
 namespace {
 
 constexpr std::uint32_t kNone = TileIndex::kAbsent;
-constexpr int kRounds = 4;
+constexpr int kRounds = 16;
 
 // The request with tiles as dense numbers, and per tile the chains it can serve.
 class Problem {
@@ -52,16 +52,21 @@ class Problem {
     return out;
   }
 
-  /// Adds tiles to `chosen` by falling gain until the slots are full or nothing gains.
+  /// Adds tiles to `chosen` by falling gain until the slots are full or nothing gains. Coarse tiles come first and are
+  /// often outdone by finer ones later: those give their slots back.
   void fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const;
-  /// Takes out tiles whose every sample has found a finer one among `chosen`. True if there were any.
+  /// Takes out tiles whose every sample has a finer one among `chosen`. True if there were any.
   bool prune(std::vector<std::uint32_t>& chosen) const;
-  /// Fills, and fills again where pruning gave slots back: coarse tiles come first and are often outdone by finer ones.
-  void complete(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
-    for (int round = 0; round < kRounds; ++round) {
-      fill(chosen, with_bonus);
-      if (!prune(chosen)) return;
+  /// Benefit if every allowed tile were chosen.
+  [[nodiscard]] double upper_bound() const {
+    double sum = 0;
+    for (std::size_t c = 0; c < links_.size(); ++c) {
+      std::size_t finest = 0;
+      while (finest < kChainLength && links_[c][finest] == kNone) ++finest;
+      sum += double(request_.chains[c].weight) *
+             double(loss_[c][kServedByCoarse] - std::min(loss_[c][finest], loss_[c][kServedByCoarse]));
     }
+    return sum;
   }
   [[nodiscard]] Allocation result(std::vector<std::uint32_t> chosen) const;
 
@@ -69,7 +74,8 @@ class Problem {
   using Losses = std::array<float, kChainLength + 1>;
   struct Entry {
     std::uint32_t chain;
-    std::uint32_t position;
+    float loss;    // of the chain if this tile serves it
+    float weight;  // of the chain
   };
 
   void read_chain(std::size_t c) {
@@ -96,22 +102,22 @@ class Problem {
     for (std::size_t c = 0; c < links_.size(); ++c)
       for (std::size_t i = 0; i < links_[c].size(); ++i)
         if (links_[c][i] != kNone)
-          entries_[next[links_[c][i]]++] = {static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i)};
+          entries_[next[links_[c][i]]++] = {static_cast<std::uint32_t>(c), loss_[c][i], request_.chains[c].weight};
   }
 
   [[nodiscard]] double gain(std::uint32_t tile, const std::vector<float>& best) const {
     double sum = 0;
     for (auto e = first_[tile]; e < first_[tile + 1]; ++e) {
       const auto& entry = entries_[e];
-      const float better = best[entry.chain] - loss_[entry.chain][entry.position];
-      if (better > 0) sum += double(request_.chains[entry.chain].weight) * better;
+      const float better = best[entry.chain] - entry.loss;
+      if (better > 0) sum += double(entry.weight * better);
     }
     return sum;
   }
   void take(std::uint32_t tile, std::vector<float>& best) const {
     for (auto e = first_[tile]; e < first_[tile + 1]; ++e) {
       const auto& entry = entries_[e];
-      best[entry.chain] = std::min(best[entry.chain], loss_[entry.chain][entry.position]);
+      best[entry.chain] = std::min(best[entry.chain], entry.loss);
     }
   }
 
@@ -152,17 +158,21 @@ void Problem::fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
     if (!taken[tile])
       if (const double v = value(tile); v > 0) initial.push_back({v, tile});
   std::priority_queue queue(worse, std::move(initial));
-  while (chosen.size() < request_.slots && !queue.empty()) {
-    auto top = queue.top();
-    queue.pop();
-    top.gain = value(top.tile);  // gains only fall (submodular): a fresh one that still leads is the largest
-    if (top.gain <= 0) continue;
-    if (!queue.empty() && worse(top, queue.top())) {
-      queue.push(top);
-      continue;
+  for (int round = 0; round < kRounds; ++round) {
+    while (chosen.size() < request_.slots && !queue.empty()) {
+      auto top = queue.top();
+      queue.pop();
+      top.gain = value(top.tile);  // gains only fall (submodular): a fresh one that still leads is the largest
+      if (top.gain <= 0) continue;
+      if (!queue.empty() && worse(top, queue.top())) {
+        queue.push(top);
+        continue;
+      }
+      chosen.push_back(top.tile);
+      take(top.tile, best);
     }
-    chosen.push_back(top.tile);
-    take(top.tile, best);
+    // What is pruned serves nobody: the losses, and so the queue, stay right without it.
+    if (!prune(chosen)) break;
   }
 }
 
@@ -217,17 +227,18 @@ float serving_loss(const Chain& chain, int position, int coarse_level, const All
 Allocation allocate_slots(const AllocationRequest& request, const AllocationOptions& options) {
   const Problem problem(request, options);
   if (auto all = problem.finest(); all.size() <= request.slots) return problem.result(std::move(all));
-  std::vector<std::uint32_t> fresh;
-  problem.complete(fresh, true);
-  auto best = problem.result(std::move(fresh));
   // Greedy picks near the cut-off depend on small changes of weight. What is there stays unless that costs something.
-  auto kept = problem.useful_residents();
-  if (!kept.empty() && kept.size() <= request.slots) {
-    problem.complete(kept, false);
-    auto stay = problem.result(std::move(kept));
-    if (stay.benefit >= best.benefit * (1.0 - double(options.least_improvement))) return stay;
+  const double enough = 1.0 - double(options.least_improvement);
+  Allocation stay;
+  if (auto kept = problem.useful_residents(); !kept.empty() && kept.size() <= request.slots) {
+    problem.fill(kept, false);
+    stay = problem.result(std::move(kept));
+    if (stay.benefit >= enough * problem.upper_bound()) return stay;
   }
-  return best;
+  std::vector<std::uint32_t> fresh;
+  problem.fill(fresh, true);
+  auto best = problem.result(std::move(fresh));
+  return !stay.tiles.empty() && stay.benefit >= enough * best.benefit ? stay : best;
 }
 
 }  // namespace darm::tile_scheduler

@@ -3,6 +3,10 @@
 namespace darm::tile_scheduler {
 
 void VisibleSet::add(const Chain& chain, float count) {
+  if (last_chain_ < counts_.size() && chains_.keys()[last_chain_] == chain) {
+    counts_[last_chain_] += count;
+    return;
+  }
   if (chains_.size() >= kMaxChains && chains_.find(chain) == ChainIndex::kAbsent) {
     ++left_out_;
     return;
@@ -10,18 +14,20 @@ void VisibleSet::add(const Chain& chain, float count) {
   const auto number = chains_.insert(chain);
   if (number == counts_.size()) counts_.push_back(0.0f);
   counts_[number] += count;
+  last_chain_ = number;
 }
 
 TileUse* VisibleSet::use(TileId tile) {
-  if (tile == last_tile_) return &uses_[last_index_];
+  const auto level = static_cast<std::size_t>(tile.level());
+  if (tile == last_tile_[level]) return &uses_[last_index_[level]];
   if (tiles_.size() >= kMaxTiles && tiles_.find(tile) == TileIndex::kAbsent) {
     ++left_out_;
     return nullptr;
   }
   const auto number = tiles_.insert(tile);
   if (number == uses_.size()) uses_.emplace_back();
-  last_tile_ = tile;
-  last_index_ = number;
+  last_tile_[level] = tile;
+  last_index_[level] = number;
   return &uses_[number];
 }
 

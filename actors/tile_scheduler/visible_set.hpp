@@ -2,7 +2,9 @@
 // read.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -44,14 +46,22 @@ class VisibleSet {
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
 
  private:
+  static constexpr std::array<TileId, kMaxLevels> no_tiles() {
+    std::array<TileId, kMaxLevels> none;
+    none.fill(kNoTile);
+    return none;
+  }
+
   ChainIndex chains_;
   std::vector<float> counts_;
   TileIndex tiles_;
   std::vector<TileUse> uses_;
   double samples_ = 0;
   std::size_t left_out_ = 0;
-  TileId last_tile_ = kNoTile;  // neighbouring samples mostly read the same tile
-  std::size_t last_index_ = 0;
+  // Neighbouring samples mostly share chain and tiles: the last tile of each level, the last chain.
+  std::array<TileId, kMaxLevels> last_tile_ = no_tiles();
+  std::array<std::uint32_t, kMaxLevels> last_index_{};
+  std::uint32_t last_chain_ = 0;
 };
 
 }  // namespace darm::tile_scheduler
