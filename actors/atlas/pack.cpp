@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 #include <map>
@@ -13,10 +12,11 @@
 namespace darm::atlas {
 namespace {
 
-/// Own texels of a group: about six hundred tiles, what one view into a corner of a scene shows.
-constexpr std::uint64_t kGroupTexels = 1u << 19;
-/// Patches over this many texels fill their own tiles whatever lies beside them: they go first, tallest first.
-constexpr std::uint64_t kBigTexels = 64u * kTileTexels;
+/// A group holds this share of a level: of Sponza at q=64 two thousand tiles, about what one view shows.
+constexpr std::uint64_t kGroups = 16;
+/// Patches over this share of a level go before all groups, longest first: what sticks out of a group is never filled
+/// well. They fill tiles of their own, so little locality is lost.
+constexpr std::uint64_t kBigShare = 8000;
 constexpr std::int32_t kPreferredWidth = 64 * kTileSize;
 
 std::uint64_t spread_bits(std::uint64_t v) {  // 21 bits, two zeros between
@@ -129,27 +129,30 @@ Level pack_level(const Charts& charts, const PackOrder& order, const FootprintSe
   const auto wanted = std::max(std::min(square, kPreferredWidth), square / 4);
   Strip strip(round_up(std::max(widest, wanted), kTileSize));
 
-  const auto taller = [&](std::uint32_t a, std::uint32_t b) {
+  const std::uint64_t big = std::max<std::uint64_t>(footprints.texels / kBigShare, 4);
+  const std::uint64_t group_texels = footprints.texels / kGroups;
+  const auto longer = [&](std::uint32_t a, std::uint32_t b) {
     const auto &x = shape(a), &y = shape(b);
-    return x.height != y.height ? x.height > y.height : x.width != y.width ? x.width > y.width : false;
+    const auto round_x = x.height + x.width, round_y = y.height + y.width;
+    return round_x != round_y ? round_x > round_y : x.height > y.height;
   };
   std::vector<std::uint32_t> sequence;
   sequence.reserve(order.patches.size());
   for (const auto p : order.patches)
-    if (shape(p).texels >= kBigTexels) sequence.push_back(p);
-  std::stable_sort(sequence.begin(), sequence.end(), taller);
+    if (shape(p).texels >= big) sequence.push_back(p);
+  std::stable_sort(sequence.begin(), sequence.end(), longer);
   std::size_t group = sequence.size();
   std::uint64_t in_group = 0;
   const auto close_group = [&] {
-    std::stable_sort(sequence.begin() + static_cast<std::ptrdiff_t>(group), sequence.end(), taller);
+    std::stable_sort(sequence.begin() + static_cast<std::ptrdiff_t>(group), sequence.end(), longer);
     group = sequence.size();
     in_group = 0;
   };
   for (const auto p : order.patches) {
-    if (shape(p).texels >= kBigTexels) continue;
+    if (shape(p).texels >= big) continue;
     sequence.push_back(p);
     in_group += shape(p).texels;
-    if (in_group >= kGroupTexels) close_group();
+    if (in_group >= group_texels) close_group();
   }
   close_group();
 
