@@ -1,0 +1,110 @@
+#include "actors/renderer/reference_state.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <glm/common.hpp>
+
+namespace darm::renderer {
+namespace {
+
+constexpr std::uint64_t kMagic = 0x31464552'4d524144;  // "DARMREF1"
+
+struct Header {
+  std::uint64_t magic = kMagic;
+  std::uint64_t job_hash = 0;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t passes = 0;
+  std::uint32_t reserved = 0;
+  double seconds = 0;
+  std::uint64_t check_sum = 0;
+};
+static_assert(sizeof(QuarterMean) == 16 && sizeof(Header) == 48);
+
+std::uint64_t check_sum(const ReferenceState& state) {
+  std::uint64_t h = 0xcbf29ce484222325ull;
+  for (const auto& half : state.halves)
+    for (const auto& q : half) {
+      std::array<std::uint64_t, 2> words;
+      std::memcpy(words.data(), &q, sizeof q);
+      for (const auto w : words) h = std::rotl((h ^ w) * 0x9e3779b97f4a7c15ull, 29);
+    }
+  return h;
+}
+
+}  // namespace
+
+ReferenceState::ReferenceState(std::uint64_t hash, std::uint32_t picture_width, std::uint32_t picture_height)
+    : job_hash(hash), width(picture_width), height(picture_height) {
+  for (auto& half : halves) half.resize(std::size_t{width} * height * kQuarters);
+}
+
+Picture ReferenceState::picture(int half) const {
+  Picture made{width, height, std::vector<glm::vec3>(std::size_t{width} * height)};
+  for (std::size_t pixel = 0; pixel < made.pixels.size(); ++pixel) {
+    glm::vec3 sum(0.0f);
+    float filled = 0;
+    for (std::size_t q = pixel * kQuarters; q < (pixel + 1) * kQuarters; ++q) {
+      const auto& a = halves[0][q];
+      const auto& b = halves[1][q];
+      const float wa = half == 1 ? 0.0f : static_cast<float>(a.count);
+      const float wb = half == 0 ? 0.0f : static_cast<float>(b.count);
+      if (wa + wb <= 0) continue;
+      sum += glm::clamp((a.mean * wa + b.mean * wb) / (wa + wb), 0.0f, 1.0f);
+      filled += 1;
+    }
+    if (filled > 0) made.pixels[pixel] = sum / filled;
+  }
+  return made;
+}
+
+Result<void> save_state(const std::filesystem::path& path, const ReferenceState& state) {
+  auto beside = path;
+  beside += ".part";
+  Header header;
+  header.job_hash = state.job_hash;
+  header.width = state.width;
+  header.height = state.height;
+  header.passes = state.passes;
+  header.seconds = state.seconds;
+  header.check_sum = check_sum(state);
+  std::ofstream file(beside, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(&header), sizeof header);
+  for (const auto& half : state.halves)
+    file.write(reinterpret_cast<const char*>(half.data()),
+               static_cast<std::streamsize>(half.size() * sizeof(QuarterMean)));
+  file.close();
+  std::error_code error;
+  if (file) std::filesystem::rename(beside, path, error);
+  if (!file || error) return fail(path.string() + ": state cannot be written; check the folder and the free space");
+  return {};
+}
+
+Result<void> load_state(const std::filesystem::path& path, ReferenceState& state) {
+  const auto refuse = [&](const char* what) {
+    return fail(path.string() + ": " + what + "; delete it or name another state file");
+  };
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return refuse("cannot be read");
+  Header header;
+  file.read(reinterpret_cast<char*>(&header), sizeof header);
+  if (!file || header.magic != kMagic) return refuse("is no state of a reference picture");
+  if (header.job_hash != state.job_hash || header.width != state.width || header.height != state.height)
+    return refuse("belongs to another picture (scene, camera, size, exposure or effects differ)");
+  ReferenceState loaded(state.job_hash, state.width, state.height);
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  const std::size_t bytes = loaded.halves[0].size() * sizeof(QuarterMean);
+  if (error || size != sizeof header + 2 * bytes) return refuse("is truncated or has bytes to spare");
+  for (auto& half : loaded.halves) file.read(reinterpret_cast<char*>(half.data()), static_cast<std::streamsize>(bytes));
+  if (!file || check_sum(loaded) != header.check_sum || !std::isfinite(header.seconds)) return refuse("is damaged");
+  loaded.passes = header.passes;
+  loaded.seconds = header.seconds;
+  state = std::move(loaded);
+  return {};
+}
+
+}  // namespace darm::renderer

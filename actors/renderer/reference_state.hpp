@@ -1,0 +1,45 @@
+// The unfinished reference picture: sums per quarter pixel and half, and its file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "actors/renderer/picture_io.hpp"
+#include "actors/types/error.hpp"
+
+namespace darm::renderer {
+
+inline constexpr std::size_t kQuarters = 4;
+
+/// Running mean of the radiance that reached one quarter of a pixel, exposed but not clamped.
+struct QuarterMean {
+  glm::vec3 mean{0.0f};
+  std::uint32_t count = 0;
+  void add(const glm::vec3& x) {
+    ++count;
+    mean += (x - mean) * (1.0f / static_cast<float>(count));
+  }
+};
+
+struct ReferenceState {
+  std::uint64_t job_hash = 0;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t passes = 0;  ///< samples per pixel of each half
+  double seconds = 0;
+  std::array<std::vector<QuarterMean>, 2> halves;  ///< width * height * kQuarters, pixel by pixel
+
+  ReferenceState(std::uint64_t hash, std::uint32_t picture_width, std::uint32_t picture_height);
+  /// Picture of one half, or of both together for `half` 2.
+  [[nodiscard]] Picture picture(int half) const;
+};
+
+/// Writes beside `path` and renames, so that a reader sees the old state or the new one. Errors: disk.
+[[nodiscard]] Result<void> save_state(const std::filesystem::path& path, const ReferenceState& state);
+/// Fills `state` (made for the job at hand) from `path`. Errors: another job, another size, damage; state is untouched.
+[[nodiscard]] Result<void> load_state(const std::filesystem::path& path, ReferenceState& state);
+
+}  // namespace darm::renderer
