@@ -57,7 +57,7 @@ TileProgress survey_tile(const atlas::RadianceStore& store, TileId tile, const T
 }
 
 Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask, std::uint32_t passes,
-                                 const TileSurface& surface) {
+                                 const TileSurface& surface, std::uint32_t most) {
   ShadingResult result;
   const auto view = store.read(tile);
   const auto count_of = [&](int t) { return view ? view->count(Layer::kSoft, t) : 0.0f; };
@@ -65,7 +65,7 @@ Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const
   result.progress = before;
   if (before.texels == 0) return result;
 
-  const auto goal = static_cast<std::uint32_t>(before.least) + passes;
+  const auto goal = std::min(static_cast<std::uint32_t>(before.least) + passes, most);
   std::vector<TexelWork> work;
   for (int t = 0; t < kTileTexels; ++t) {
     if (!mask.test(t) || surface.patch(t) == kNobody) continue;

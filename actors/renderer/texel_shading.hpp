@@ -30,10 +30,11 @@ struct ShadingResult {
                                        const TileSurface& surface);
 
 /// Adds up to `passes` samples to each texel of `mask`; texels that are ahead of the least one by more than that wait,
-/// so that newly seen texels catch up. Nothing outside the mask is touched. Sample numbers continue where the store
-/// stands, so a restart goes on in the same sequence. The store is held open only to merge: a crash costs one merge.
-/// Fails if the store takes no new tile. One thread per tile.
+/// so that newly seen texels catch up, and none goes beyond `most`. Nothing outside the mask is touched. Sample numbers
+/// continue where the store stands, so a restart goes on in the same sequence. The store is held open only to merge: a
+/// crash costs one merge. Fails if the store takes no new tile. One thread per tile.
 [[nodiscard]] Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask,
-                                               std::uint32_t passes, const TileSurface& surface);
+                                               std::uint32_t passes, const TileSurface& surface,
+                                               std::uint32_t most = 0xffffffffu);
 
 }  // namespace darm::renderer

@@ -38,7 +38,7 @@ struct TileFacts {
 /// at a time, and not while they are read (the renderer's phases).
 class TileFactsCache {
  public:
-  explicit TileFactsCache(std::size_t max_tiles = 8192) : max_tiles_(max_tiles < 16 ? 16 : max_tiles) {}
+  explicit TileFactsCache(std::size_t max_tiles = 16384) : max_tiles_(max_tiles < 16 ? 16 : max_tiles) {}
 
   /// The tile's facts, made (patches and coverage) if they are not there. Null outside the level.
   std::shared_ptr<TileFacts> get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces);

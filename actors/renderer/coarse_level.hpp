@@ -1,0 +1,60 @@
+// The coarsest level as a whole: what a new client sees first, shaded in rounds beside the working set.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "actors/renderer/tile_display.hpp"
+#include "actors/renderer/tile_schedule.hpp"
+
+namespace darm::renderer {
+
+/// The coarse level as a picture, sRGB, interleaved, top row first. No texel is left black for want of light.
+struct CoarsePicture {
+  std::uint32_t version = 0;  ///< 1, 2, 3, ...
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// Round 0 shades every fourth texel (a first picture in a quarter of the time), round r then brings every texel to r
+/// samples. A picture is due after rounds 0, 1, 2, 4, 8, ... and the last.
+class CoarseRounds {
+ public:
+  /// `rounds` 0: the coarse level is left alone.
+  CoarseRounds(int level, LevelTiles tiles, std::uint32_t rounds) : level_(level), tiles_(tiles), rounds_(rounds) {}
+
+  [[nodiscard]] bool finished() const { return round_ > rounds_ || rounds_ == 0; }
+  [[nodiscard]] bool first_pass_done() const { return round_ > 1 || finished(); }
+  [[nodiscard]] int level() const { return level_; }
+  [[nodiscard]] const LevelTiles& tiles() const { return tiles_; }
+
+  /// Jobs worth about `samples` from the current round, which ends with the last of its tiles.
+  [[nodiscard]] std::vector<TileJob> next_batch(std::uint64_t samples);
+  /// Call when all jobs handed out are done. True if a picture is due now.
+  bool batch_finished();
+
+ private:
+  int level_;
+  LevelTiles tiles_;
+  std::uint32_t rounds_;
+  std::uint32_t round_ = 0;
+  std::uint32_t cursor_ = 0;
+};
+
+/// A coarse picture being put together; different tiles may be drawn from different threads.
+class CoarseCanvas {
+ public:
+  CoarseCanvas(LevelTiles tiles, std::uint32_t version);
+  void put(std::uint32_t tile_index, const TileImage& image);
+  /// Gives tiles that were not put the mean colour of the nearest one that was.
+  [[nodiscard]] std::shared_ptr<const CoarsePicture> finish();
+
+ private:
+  LevelTiles tiles_;
+  std::shared_ptr<CoarsePicture> picture_;
+  std::vector<std::uint8_t> drawn_;
+};
+
+}  // namespace darm::renderer

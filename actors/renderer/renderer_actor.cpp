@@ -1,0 +1,283 @@
+#include "actors/renderer/renderer_actor.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+#include "actors/renderer/texel_shading.hpp"
+
+namespace darm::renderer {
+
+namespace {
+
+constexpr std::size_t kPicturesPerSlice = 24;
+constexpr float kCountWithoutFilter = 512;  // texels of more samples need no albedo: they are never filtered
+
+}  // namespace
+
+struct RendererActor::Shared {
+  explicit Shared(RendererParts p) : parts(std::move(p)) {}
+  RendererParts parts;
+  TileFactsCache facts;
+
+  [[nodiscard]] runtime::MetricSink& metrics() const {
+    return parts.metrics != nullptr ? *parts.metrics : runtime::null_metrics();
+  }
+  [[nodiscard]] LevelTiles level_of(TileId tile) const {
+    const auto level = static_cast<std::size_t>(tile.level());
+    return level < parts.levels.size() ? parts.levels[level] : LevelTiles{};
+  }
+};
+
+struct RendererActor::JobResult {
+  ShadingResult shading;
+  std::optional<TilePicture> picture;
+  double seconds = 0;
+  bool failed = false;
+};
+
+struct RendererActor::Batch {
+  std::vector<TileJob> jobs;
+  std::vector<JobResult> results;  // each written by the one slice that runs the job
+  std::shared_ptr<CoarseCanvas> canvas;
+};
+
+RendererActor::RendererActor(runtime::Context<Inbox> context, RendererParts parts)
+    : Actor(std::move(context)),
+      shared_(std::make_shared<Shared>(std::move(parts))),
+      schedule_(shared_->parts.levels, shared_->parts.options.schedule),
+      coarse_(static_cast<int>(shared_->parts.levels.size()) - 1,
+              shared_->parts.levels.empty() ? LevelTiles{} : shared_->parts.levels.back(),
+              shared_->parts.levels.empty() ? 0 : shared_->parts.options.coarse_rounds) {}
+
+void RendererActor::on_start() { begin_batch(); }
+
+void RendererActor::on(ShadeTiles&& message) {
+  waiting_ = std::move(message);
+  if (phase_ == Phase::kIdle) begin_batch();
+}
+
+void RendererActor::on(SliceFinished&& message) {
+  if (message.slice != batch_number_ || slices_left_ == 0) return;
+  if (--slices_left_ > 0) return;
+  const double seconds = static_cast<double>(now_us() - phase_began_us_) * 1e-6;
+  if (phase_ == Phase::kShading) {
+    shared_->metrics().observe("darm_renderer_phase_seconds", seconds, {{"phase", "shading"}});
+    finish_shading();
+  } else {
+    shared_->metrics().observe("darm_renderer_phase_seconds", seconds, {{"phase", "pictures"}});
+    finish_pictures();
+  }
+}
+
+std::vector<TileJob> RendererActor::choose_jobs() {
+  const auto& options = shared_->parts.options;
+  const double budget = std::max(64.0, double{options.batch_ms} * 1000.0 * executor().workers() / sample_us_);
+  const double share = coarse_.finished()          ? 0.0
+                       : coarse_.first_pass_done() ? double{options.coarse_share}
+                                                   : double{options.coarse_first_share};
+  auto jobs = schedule_.next_batch(static_cast<std::uint64_t>(budget * (1.0 - share)));
+  // The coarse level earns its share of what visible tiles cost; with nothing visible it has all.
+  std::uint64_t cost = 0;
+  for (const auto& job : jobs) cost += job.cost;
+  coarse_credit_ = jobs.empty() ? budget : coarse_credit_ + static_cast<double>(cost) * share / (1.0 - share);
+  if (coarse_credit_ < kTileTexels / 2.0) return jobs;
+  // A tile has one writer: while the coarse level's tiles are in the working set, its turn on them is skipped.
+  const auto visible = static_cast<std::ptrdiff_t>(jobs.size());
+  for (auto& job : coarse_.next_batch(static_cast<std::uint64_t>(coarse_credit_))) {
+    coarse_credit_ -= job.cost;
+    if (std::none_of(jobs.begin(), jobs.begin() + visible, [&](const TileJob& j) { return j.tile == job.tile; }))
+      jobs.push_back(job);
+  }
+  return jobs;
+}
+
+void RendererActor::begin_batch() {
+  if (waiting_) {
+    static const std::vector<TileRequest> kNothing;
+    schedule_.replace(waiting_->work ? *waiting_->work : kNothing,
+                      [this](TileId tile) { return shared_->parts.store->has(tile); });
+    waiting_.reset();
+  }
+  auto batch = std::make_shared<Batch>();
+  batch->jobs = choose_jobs();
+  if (batch->jobs.empty()) {
+    batch_ = std::move(batch);
+    begin_pictures();  // a tile back in view has its picture due, with nothing left to shade
+    return;
+  }
+  phase_ = Phase::kShading;
+  const double slice_samples = double{shared_->parts.options.slice_ms} * 1000.0 / sample_us_;
+  std::vector<std::size_t> starts;
+  double filled = slice_samples;
+  for (std::size_t i = 0; i < batch->jobs.size(); ++i) {
+    if (filled >= slice_samples) {
+      starts.push_back(i);
+      filled = 0;
+    }
+    filled += batch->jobs[i].cost;
+  }
+  post_slices(batch, std::move(starts), &RendererActor::shade_one);
+}
+
+void RendererActor::post_slices(const std::shared_ptr<Batch>& batch, std::vector<std::size_t> starts,
+                                void (*work)(Shared&, Batch&, std::size_t)) {
+  batch_ = batch;
+  batch_->results.resize(batch_->jobs.size());
+  ++batch_number_;
+  slices_left_ = starts.size();
+  phase_began_us_ = now_us();
+  for (std::size_t s = 0; s < starts.size(); ++s) {
+    const std::size_t first = starts[s];
+    const std::size_t end = s + 1 < starts.size() ? starts[s + 1] : batch_->jobs.size();
+    executor().post(
+        runtime::Priority::kNormal, [shared = shared_, batch, first, end, work, me = self(), number = batch_number_] {
+          for (std::size_t i = first; i < end; ++i) {
+            const auto began = std::chrono::steady_clock::now();
+            try {
+              work(*shared, *batch, i);
+            } catch (const std::exception&) {
+              batch->results[i].failed = true;  // retried once, then the tile is quarantined
+            }
+            batch->results[i].seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+          }
+          me.tell(SliceFinished(number));
+        });
+  }
+}
+
+void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
+  const TileJob& job = batch.jobs[index];
+  JobResult& result = batch.results[index];
+  const auto surface = shared.parts.surfaces->tile(job.tile);
+  if (!surface) return;  // outside the atlas: nothing to shade, nothing to show
+  if (job.passes == 0) {
+    result.shading.progress = survey_tile(*shared.parts.store, job.tile, job.mask, *surface);
+  } else {
+    auto shaded = shade_tile(*shared.parts.store, job.tile, job.mask, job.passes, *surface, job.most);
+    if (!shaded) {
+      result.failed = true;
+      return;
+    }
+    result.shading = *shaded;
+  }
+  const LevelTiles level = shared.level_of(job.tile);
+  const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces);
+  if (facts && result.shading.progress.mean > 0 && result.shading.progress.least < kCountWithoutFilter)
+    facts->learn_albedo(*surface, job.mask);
+}
+
+void RendererActor::learn_cost(double seconds, std::uint64_t samples) {
+  if (samples < 64 || seconds <= 0) return;
+  const double now = std::clamp(seconds * 1e6 / static_cast<double>(samples), 0.2, 2000.0);
+  sample_us_ += 0.25 * (now - sample_us_);
+}
+
+void RendererActor::finish_shading() {
+  double seconds = 0;
+  std::uint64_t samples = 0;
+  std::uint64_t bad = 0;
+  std::uint64_t tiles = 0;
+  std::uint64_t given_up = 0;
+  for (std::size_t i = 0; i < batch_->jobs.size(); ++i) {
+    const TileJob& job = batch_->jobs[i];
+    const JobResult& r = batch_->results[i];
+    if (r.failed) {
+      if (!job.coarse && !schedule_.failed(job.tile)) ++given_up;
+      continue;
+    }
+    if (!job.coarse) schedule_.shaded(job.tile, r.shading.progress, r.shading.samples);
+    samples += r.shading.samples;
+    bad += r.shading.quarantined;
+    tiles += r.shading.samples > 0 ? 1 : 0;
+    if (r.shading.samples > 0) seconds += r.seconds;
+  }
+  learn_cost(seconds, samples);
+  coarse_due_ = coarse_.batch_finished() || coarse_due_;
+  auto& metrics = shared_->metrics();
+  metrics.count("darm_renderer_texel_samples_total", static_cast<double>(samples));
+  metrics.count("darm_renderer_tiles_shaded_total", static_cast<double>(tiles));
+  if (bad > 0) metrics.count("darm_renderer_quarantined_samples_total", static_cast<double>(bad));
+  if (given_up > 0) metrics.count("darm_renderer_quarantined_tiles_total", static_cast<double>(given_up));
+  const auto stored = shared_->parts.store->counters();
+  metrics.set("darm_store_tiles", static_cast<double>(stored.tiles));
+  metrics.set("darm_store_bytes", static_cast<double>(stored.bytes));
+  metrics.set("darm_store_torn_tiles", static_cast<double>(stored.torn));
+  metrics.set("darm_store_refused_updates", static_cast<double>(stored.refused_full));
+  begin_pictures();
+}
+
+void RendererActor::begin_pictures() {
+  auto next = std::make_shared<Batch>();
+  for (const TileId tile : schedule_.pictures_due()) {
+    TileJob job;
+    job.tile = tile;
+    job.mask = *schedule_.mask_of(tile);
+    next->jobs.push_back(job);
+  }
+  if (coarse_due_ && shared_->parts.coarse) {
+    next->canvas = std::make_shared<CoarseCanvas>(coarse_.tiles(), ++coarse_number_);
+    for (std::uint32_t t = 0; t < coarse_.tiles().x * coarse_.tiles().y; ++t) {
+      TileJob job;
+      job.tile = TileId(coarse_.level(), t);
+      job.mask = TexelMask::all();
+      job.coarse = true;
+      next->jobs.push_back(job);
+    }
+  }
+  coarse_due_ = false;
+  if (next->jobs.empty()) {
+    const bool worked = !batch_->jobs.empty();
+    phase_ = Phase::kIdle;
+    if (worked || waiting_) begin_batch();
+    return;
+  }
+  phase_ = Phase::kPictures;
+  std::vector<std::size_t> starts;
+  for (std::size_t i = 0; i < next->jobs.size(); i += kPicturesPerSlice) starts.push_back(i);
+  post_slices(next, std::move(starts), &RendererActor::picture_one);
+}
+
+void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index) {
+  const TileJob& job = batch.jobs[index];
+  TileDisplay display(*shared.parts.store, shared.facts, shared.parts.options.display);
+  auto picture = display.draw(job.tile, shared.level_of(job.tile), job.mask);
+  if (job.coarse) {
+    if (picture) batch.canvas->put(job.tile.index(), *picture->image);
+  } else {
+    batch.results[index].picture = std::move(picture);
+  }
+}
+
+void RendererActor::finish_pictures() {
+  std::vector<tile_scheduler::ShadedTile> tiles;
+  for (std::size_t i = 0; i < batch_->jobs.size(); ++i) {
+    const TileJob& job = batch_->jobs[i];
+    JobResult& r = batch_->results[i];
+    if (job.coarse) continue;
+    schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f);
+    if (!r.picture) continue;
+    tile_scheduler::ShadedTile shaded;
+    shaded.tile = job.tile;
+    shaded.version = ++picture_number_;
+    shaded.error = r.picture->error;
+    shaded.samples = r.picture->samples;
+    shaded.image = std::move(r.picture->image);
+    tiles.push_back(std::move(shaded));
+  }
+  shared_->metrics().count("darm_renderer_images_total", static_cast<double>(tiles.size()));
+  if (!tiles.empty()) {
+    std::vector<TileId> names;
+    for (const auto& t : tiles) names.push_back(t.tile);
+    if (!shared_->parts.scheduler.tell(tile_scheduler::TilesShaded(std::move(tiles)))) {
+      shared_->metrics().count("darm_renderer_pictures_refused_total", static_cast<double>(names.size()));
+      if (shared_->parts.scheduler)
+        for (const TileId t : names) schedule_.forget_picture(t);
+    }
+  }
+  if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
+  begin_batch();
+}
+
+}  // namespace darm::renderer

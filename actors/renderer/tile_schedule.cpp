@@ -1,0 +1,177 @@
+#include "actors/renderer/tile_schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace darm::renderer {
+
+namespace {
+constexpr std::uint32_t kSurveyCost = 40;  // samples' worth of time
+constexpr double kHiddenShare = 0.02;      // weight of tiles that serve only as borders
+constexpr float kLeastForTarget = 16;      // an error estimate of fewer samples is not believed
+}  // namespace
+
+TileSchedule::TileSchedule(std::vector<LevelTiles> levels, const ScheduleOptions& options)
+    : levels_(std::move(levels)), options_(options) {
+  options_.publish_growth = std::max(options_.publish_growth, 1.01f);
+  options_.max_samples = std::clamp(options_.max_samples, 1u, 1u << 22);
+  options_.job_samples = std::max(options_.job_samples, 1u);
+}
+
+void TileSchedule::replace(const std::vector<TileRequest>& work, const std::function<bool(TileId)>& stored) {
+  std::unordered_map<TileId, State> next;
+  next.reserve(work.size());
+  for (const auto& request : work) {
+    State s;
+    if (const auto it = tiles_.find(request.tile); it != tiles_.end()) {
+      s = it->second;
+      TexelMask both = s.mask;
+      both |= request.mask;
+      if (!(both == s.mask)) s.surveyed = false;
+      if (!request.display) s.pictured_mean = -1;
+    }
+    s.mask = request.mask;
+    s.weight = std::isfinite(request.weight) ? std::max(request.weight, 0.0f) : 0.0f;
+    s.display = request.display;
+    s.stored = s.stored || stored(request.tile);
+    next.insert_or_assign(request.tile, s);
+  }
+  tiles_ = std::move(next);
+}
+
+bool TileSchedule::finished(const State& s) const {
+  if (s.progress.texels == 0 || s.progress.least >= static_cast<float>(options_.max_samples)) return true;
+  return options_.target_error > 0 && s.error >= 0 && s.error <= options_.target_error && s.progress.unshaded == 0 &&
+         s.pictured_mean >= kLeastForTarget;
+}
+
+TileSchedule::Need TileSchedule::need_of(const State& s) const {
+  if (s.quarantined || s.mask.empty()) return Need::kNothing;
+  if (!s.surveyed) return s.stored ? Need::kSurvey : Need::kFirst;
+  if (s.progress.unshaded > 0) return Need::kFirst;
+  return finished(s) ? Need::kNothing : Need::kMore;
+}
+
+// Variance falls as v/n: one more sample for each of t texels gains about w * (v/n) / n for the price of t samples.
+double TileSchedule::gain_of(const State& s, Need need) const {
+  const double weight = (s.display ? 1.0 : kHiddenShare) * (double{s.weight} + 1e-9);
+  if (need != Need::kMore) return weight;
+  const double n = std::max(double{s.progress.mean}, 1.0);
+  const double error = s.error > 0 ? s.error * std::sqrt(std::max(s.pictured_mean, 1.0f) / n) : 0.3 / std::sqrt(n);
+  return weight * error * error / (n * std::max(s.progress.texels, 1u));
+}
+
+TileJob TileSchedule::job_for(TileId tile, const State& s, Need need) const {
+  TileJob job;
+  job.tile = tile;
+  job.mask = s.mask;
+  job.most = options_.max_samples;
+  if (need == Need::kSurvey) {
+    job.cost = kSurveyCost;
+  } else if (need == Need::kFirst) {
+    job.passes = 1;
+    job.cost = s.surveyed ? s.progress.unshaded : static_cast<std::uint32_t>(s.mask.count());
+  } else {
+    const std::uint32_t fit = options_.job_samples / std::max(s.progress.texels, 1u);
+    const auto half = static_cast<std::uint32_t>(s.progress.least / 2);
+    job.passes = std::max(1u, std::min(fit, half));
+    job.cost = job.passes * s.progress.texels;
+  }
+  job.cost = std::max(job.cost, 1u);
+  return job;
+}
+
+std::vector<TileJob> TileSchedule::next_batch(std::uint64_t samples) {
+  struct Candidate {
+    Need need;
+    double gain;
+    TileId tile;
+    const State* state;
+  };
+  std::vector<Candidate> candidates;
+  candidates.reserve(tiles_.size());
+  for (const auto& [tile, state] : tiles_)
+    if (const Need need = need_of(state); need != Need::kNothing)
+      candidates.push_back({need, gain_of(state, need), tile, &state});
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    if (a.need != b.need) return a.need < b.need;
+    if (a.gain != b.gain) return a.gain > b.gain;
+    return a.tile < b.tile;  // the same order on every run
+  });
+  std::vector<TileJob> jobs;
+  std::uint64_t taken = 0;
+  for (const auto& c : candidates) {
+    if (taken >= samples) break;
+    if (c.need != candidates.front().need) break;  // what is stored is shown, and all is lit once, before anything else
+    jobs.push_back(job_for(c.tile, *c.state, c.need));
+    taken += jobs.back().cost;
+  }
+  return jobs;
+}
+
+void TileSchedule::shaded(TileId tile, const TileProgress& progress, std::uint32_t samples) {
+  const auto it = tiles_.find(tile);
+  if (it == tiles_.end()) return;
+  State& s = it->second;
+  const bool first_light = s.progress.mean <= 0 && progress.mean > 0;
+  if (samples > 0 && (!s.surveyed || s.progress.unshaded > 0)) s.fresh_texels = true;
+  s.progress = progress;
+  s.surveyed = true;
+  s.stored = s.stored || samples > 0;
+  s.failures = 0;
+  if (!first_light || static_cast<std::size_t>(tile.level()) >= levels_.size()) return;
+  for (int d = 0; d < 9; ++d) {
+    const auto other = neighbour_of(tile, levels_[static_cast<std::size_t>(tile.level())], d % 3 - 1, d / 3 - 1);
+    if (!other || *other == tile) continue;
+    if (const auto n = tiles_.find(*other); n != tiles_.end() && n->second.pictured_mean >= 0)
+      n->second.stale_border = true;
+  }
+}
+
+bool TileSchedule::failed(TileId tile) {
+  const auto it = tiles_.find(tile);
+  if (it == tiles_.end()) return true;
+  if (++it->second.failures < 2) return true;
+  it->second.quarantined = true;
+  return false;
+}
+
+std::vector<TileId> TileSchedule::pictures_due() const {
+  std::vector<TileId> due;
+  std::vector<TileId> borders;
+  bool calm = true;
+  for (const auto& [tile, s] : tiles_) {
+    const Need need = need_of(s);
+    calm = calm && need != Need::kFirst && need != Need::kSurvey;
+    if (!s.display || s.quarantined || s.progress.mean <= 0) continue;
+    const bool last = need == Need::kNothing && s.progress.mean > s.pictured_mean * 1.05f;
+    if (s.pictured_mean < 0 || s.fresh_texels || last || s.progress.mean >= s.pictured_mean * options_.publish_growth)
+      due.push_back(tile);
+    else if (s.stale_border)
+      borders.push_back(tile);
+  }
+  if (calm) due.insert(due.end(), borders.begin(), borders.end());
+  std::sort(due.begin(), due.end());  // neighbours together: their light is in the cache
+  return due;
+}
+
+void TileSchedule::pictured(TileId tile, float error) {
+  const auto it = tiles_.find(tile);
+  if (it == tiles_.end()) return;
+  State& s = it->second;
+  s.pictured_mean = s.progress.mean;
+  s.error = error;
+  s.fresh_texels = false;
+  s.stale_border = false;
+}
+
+void TileSchedule::forget_picture(TileId tile) {
+  if (const auto it = tiles_.find(tile); it != tiles_.end()) it->second.pictured_mean = -1;
+}
+
+const TexelMask* TileSchedule::mask_of(TileId tile) const {
+  const auto it = tiles_.find(tile);
+  return it == tiles_.end() ? nullptr : &it->second.mask;
+}
+
+}  // namespace darm::renderer

@@ -1,0 +1,83 @@
+// Which tiles are shaded next, how far, and when their picture is worth sending. Pure bookkeeping.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <unordered_map>
+#include <vector>
+
+#include "actors/renderer/renderer_messages.hpp"
+#include "actors/renderer/texel_shading.hpp"
+#include "actors/renderer/tile_surface.hpp"
+
+namespace darm::renderer {
+
+/// Shade (or, with no passes, look at) one tile.
+struct TileJob {
+  TileId tile;
+  TexelMask mask;
+  std::uint32_t passes = 0;          ///< 0: survey, no sample is taken
+  std::uint32_t most = 0xffffffffu;  ///< no texel beyond this many samples
+  std::uint32_t cost = 0;            ///< estimated samples
+  bool coarse = false;               ///< for the coarse level, not for the working set
+};
+
+struct ScheduleOptions {
+  std::uint32_t max_samples = 4096;  ///< a texel
+  float target_error = 0;            ///< a tile under it stops costing time; 0: never
+  float publish_growth = 2.0f;       ///< a picture again after this factor in samples; > 1
+  std::uint32_t job_samples = 1000;  ///< about so many in one job
+};
+
+class TileSchedule {
+ public:
+  TileSchedule(std::vector<LevelTiles> levels, const ScheduleOptions& options);
+
+  /// A new working set in place of the old one. `stored`: may the store hold light of this tile?
+  void replace(const std::vector<TileRequest>& work, const std::function<bool(TileId)>& stored);
+
+  /// Jobs worth about `samples`, each tile at most once: first tiles whose light is stored but not shown, then every
+  /// tile's first pass by weight, then by weight * expected fall of squared error per sample. Empty: nothing to do.
+  [[nodiscard]] std::vector<TileJob> next_batch(std::uint64_t samples);
+  [[nodiscard]] bool has(TileId tile) const { return tiles_.contains(tile); }
+
+  /// What a job did. Tiles no longer wanted are ignored.
+  void shaded(TileId tile, const TileProgress& progress, std::uint32_t samples);
+  /// The job failed: true if the tile may try once more, false if it is quarantined now.
+  bool failed(TileId tile);
+
+  /// Tiles whose picture is due: their first, texels seen for the first time, samples grown by publish_growth, the end
+  /// of their work; and, when no first pass waits, those whose neighbour got its first light.
+  [[nodiscard]] std::vector<TileId> pictures_due() const;
+  void pictured(TileId tile, float error);
+  /// The picture did not reach anybody: it is due again.
+  void forget_picture(TileId tile);
+  [[nodiscard]] const TexelMask* mask_of(TileId tile) const;
+
+ private:
+  struct State {
+    TexelMask mask;
+    float weight = 0;
+    bool display = true;
+    bool surveyed = false;
+    bool stored = false;
+    bool fresh_texels = false;  // some were shaded for the first time since the last picture
+    bool stale_border = false;
+    bool quarantined = false;
+    int failures = 0;
+    TileProgress progress;
+    float pictured_mean = -1;  // samples at the last picture; -1: none
+    float error = -1;          // of the last picture
+  };
+  enum class Need { kNothing, kSurvey, kFirst, kMore };
+  [[nodiscard]] Need need_of(const State& s) const;
+  [[nodiscard]] bool finished(const State& s) const;
+  [[nodiscard]] double gain_of(const State& s, Need need) const;
+  [[nodiscard]] TileJob job_for(TileId tile, const State& s, Need need) const;
+
+  std::vector<LevelTiles> levels_;
+  ScheduleOptions options_;
+  std::unordered_map<TileId, State> tiles_;
+};
+
+}  // namespace darm::renderer

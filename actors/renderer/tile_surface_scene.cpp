@@ -1,0 +1,127 @@
+#include "actors/renderer/tile_surface_scene.hpp"
+
+#include <algorithm>
+
+#include "actors/renderer/sampler.hpp"
+#include "actors/scene/texture_sampling.hpp"
+
+namespace darm::renderer {
+
+namespace {
+
+constexpr int kTriesForCover = 8;
+constexpr std::uint64_t kAlbedoSeed = 0xa1bed0;
+
+struct World {
+  std::shared_ptr<const scene::Scene> scene;
+  std::shared_ptr<const atlas::TexelMapper> mapper;
+  std::shared_ptr<const LightTransport> transport;
+  std::uint64_t seed = 0;
+
+  [[nodiscard]] const scene::Material& material_of(std::uint32_t instance) const {
+    return scene->materials[scene->meshes[scene->instances[instance].mesh].material];
+  }
+
+  // 1 unless MASK or BLEND. MASK: 0 or 1.
+  [[nodiscard]] float alpha(const SurfacePoint& p) const {
+    const auto& mesh = scene->meshes[scene->instances[p.instance].mesh];
+    const auto& m = scene->materials[mesh.material];
+    if (m.alpha_mode == scene::AlphaMode::kOpaque) return 1.0f;
+    float a = m.base_color.w * scene::interpolate_color(mesh, p.triangle, p.u, p.v).w;
+    if (m.base_color_texture.present())
+      a *= scene::sample(*scene, m.base_color_texture, mesh, p.triangle, p.u, p.v, scene::TextureEncoding::kSrgb).w;
+    if (m.alpha_mode == scene::AlphaMode::kMask) return a >= m.alpha_cutoff ? 1.0f : 0.0f;
+    return std::clamp(a, 0.0f, 1.0f);
+  }
+};
+
+class SceneTile : public TileSurface {
+ public:
+  SceneTile(TileId id, std::shared_ptr<const World> world)
+      : id_(id), world_(std::move(world)), texels_(world_->mapper->tile(id)) {}
+
+  [[nodiscard]] std::uint32_t patch(int texel) const override {
+    return index_of(texels_->patch_at(texel % kTileSize, texel / kTileSize));
+  }
+
+  [[nodiscard]] std::optional<TexelLight> light(int texel, std::uint32_t sample) const override {
+    Sampler sampler(world_->seed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
+    const auto point = covered_point(texel, sampler);
+    if (!point) return std::nullopt;
+    const auto light = world_->transport->view_independent(*point, sampler);
+    return TexelLight{light.sharp, light.soft};
+  }
+
+  [[nodiscard]] std::optional<glm::vec3> albedo(int texel, std::uint32_t sample) const override {
+    Sampler sampler(kAlbedoSeed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
+    const auto point = covered_point(texel, sampler);
+    if (!point) return std::nullopt;
+    return world_->transport->diffuse_albedo(*point);
+  }
+
+  [[nodiscard]] std::optional<float> alpha(int texel, std::uint32_t sample) const override {
+    Sampler sampler(kAlbedoSeed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
+    const auto point = texels_->sample(texel % kTileSize, texel / kTileSize, sampler.next_2d());
+    if (!point) return std::nullopt;
+    return world_->alpha(*point);
+  }
+
+  [[nodiscard]] bool translucent() const override {
+    return std::any_of(texels_->fragments().begin(), texels_->fragments().end(), [this](const auto& f) {
+      return world_->material_of(f.instance).alpha_mode != scene::AlphaMode::kOpaque;
+    });
+  }
+
+ private:
+  // A texel half cut away shows the colour of its other half: points that MASK cuts are drawn again.
+  [[nodiscard]] std::optional<SurfacePoint> covered_point(int texel, Sampler& sampler) const {
+    const int x = texel % kTileSize;
+    const int y = texel / kTileSize;
+    auto point = texels_->sample(x, y, sampler.next_2d());
+    if (!point || world_->material_of(point->instance).alpha_mode != scene::AlphaMode::kMask) return point;
+    for (int i = 0; i < kTriesForCover && world_->alpha(*point) == 0.0f; ++i)
+      if (const auto again = texels_->sample(x, y, sampler.next_2d())) point = again;
+    return point;
+  }
+
+  TileId id_;
+  std::shared_ptr<const World> world_;
+  std::shared_ptr<const atlas::TileTexels> texels_;
+};
+
+class SceneSurfaces : public TileSurfaces {
+ public:
+  explicit SceneSurfaces(std::shared_ptr<const World> world) : world_(std::move(world)) {}
+  [[nodiscard]] std::shared_ptr<const TileSurface> tile(TileId id) const override {
+    const auto& levels = world_->mapper->layout().levels;
+    if (static_cast<std::size_t>(id.level()) >= levels.size()) return nullptr;
+    const auto& level = levels[static_cast<std::size_t>(id.level())];
+    if (id.index() >= level.tiles_x * level.tiles_y) return nullptr;
+    return std::make_shared<SceneTile>(id, world_);
+  }
+
+ private:
+  std::shared_ptr<const World> world_;
+};
+
+}  // namespace
+
+std::shared_ptr<const TileSurfaces> make_scene_surfaces(std::shared_ptr<const scene::Scene> scene,
+                                                        std::shared_ptr<const atlas::TexelMapper> mapper,
+                                                        std::shared_ptr<const LightTransport> transport,
+                                                        std::uint64_t seed) {
+  auto world = std::make_shared<World>();
+  world->scene = std::move(scene);
+  world->mapper = std::move(mapper);
+  world->transport = std::move(transport);
+  world->seed = seed;
+  return std::make_shared<SceneSurfaces>(std::move(world));
+}
+
+std::vector<LevelTiles> level_tiles_of(const atlas::Layout& layout) {
+  std::vector<LevelTiles> levels;
+  for (const auto& l : layout.levels) levels.push_back({l.tiles_x, l.tiles_y});
+  return levels;
+}
+
+}  // namespace darm::renderer

@@ -1,0 +1,207 @@
+#include "actors/renderer/tile_schedule.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "actors/renderer/coarse_level.hpp"
+
+namespace darm::renderer {
+namespace {
+
+const std::vector<LevelTiles> kLevels{{10, 10}, {3, 3}};
+
+TileRequest request(std::uint32_t index, float weight, bool display = true) {
+  TileRequest r;
+  r.tile = TileId(0, index);
+  r.weight = weight;
+  r.display = display;
+  for (int x = 0; x < 10; ++x) r.mask.set(x, 0);
+  return r;
+}
+
+TileProgress at(float samples, std::uint32_t texels = 10) {
+  TileProgress p;
+  p.least = p.mean = samples;
+  p.texels = texels;
+  p.unshaded = samples > 0 ? 0 : texels;
+  return p;
+}
+
+bool nothing_stored(TileId) { return false; }
+
+class TileScheduleTest : public ::testing::Test {
+ protected:
+  // Runs a batch as if every job did what it says; returns the tiles in order.
+  std::vector<std::uint32_t> run(std::uint64_t samples) {
+    std::vector<std::uint32_t> order;
+    for (const auto& job : schedule.next_batch(samples)) {
+      float& n = counts[job.tile];
+      n = std::min(n + static_cast<float>(job.passes), static_cast<float>(job.most));
+      order.push_back(job.tile.index());
+      schedule.shaded(job.tile, at(n), job.passes * 10);
+    }
+    return order;
+  }
+  std::vector<std::uint32_t> publish(float error = 0.1f) {
+    std::vector<std::uint32_t> tiles;
+    for (const auto tile : schedule.pictures_due()) {
+      tiles.push_back(tile.index());
+      schedule.pictured(tile, error);
+    }
+    return tiles;
+  }
+  TileSchedule schedule{kLevels, ScheduleOptions{}};
+  std::unordered_map<TileId, float> counts;
+};
+
+TEST_F(TileScheduleTest, every_tile_has_its_first_pass_before_any_second) {
+  std::vector<TileRequest> work;
+  for (std::uint32_t i = 0; i < 30; ++i) work.push_back(request(i, 0.001f * static_cast<float>(i + 1)));
+  schedule.replace(work, nothing_stored);
+  std::vector<std::uint32_t> order;
+  for (int batch = 0; batch < 6; ++batch) {
+    const auto tiles = run(50);
+    order.insert(order.end(), tiles.begin(), tiles.end());
+  }
+  ASSERT_EQ(order.size(), 30u);
+  EXPECT_TRUE(std::is_sorted(order.rbegin(), order.rend())) << "heaviest first";
+  EXPECT_EQ(std::count_if(counts.begin(), counts.end(), [](const auto& c) { return c.second == 1; }), 30);
+}
+
+TEST_F(TileScheduleTest, stored_light_is_looked_at_before_anything_is_shaded) {
+  schedule.replace({request(1, 0.9f), request(2, 0.1f)}, [](TileId t) { return t.index() == 2; });
+  const auto jobs = schedule.next_batch(100'000);
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0].tile.index(), 2u);
+  EXPECT_EQ(jobs[0].passes, 0u);
+  schedule.shaded(jobs[0].tile, at(5), 0);
+  EXPECT_EQ(publish(), std::vector<std::uint32_t>{2});
+  EXPECT_EQ(run(100'000), std::vector<std::uint32_t>{1});
+}
+
+TEST_F(TileScheduleTest, samples_go_where_weighted_error_is_largest) {
+  schedule.replace({request(1, 0.1f), request(2, 0.1f), request(3, 0.4f)}, nothing_stored);
+  run(1000);
+  schedule.pictured(TileId(0, 1), 0.30f);
+  schedule.pictured(TileId(0, 2), 0.05f);
+  schedule.pictured(TileId(0, 3), 0.05f);
+  const auto jobs = schedule.next_batch(100'000);
+  ASSERT_EQ(jobs.size(), 3u);
+  EXPECT_EQ(jobs[0].tile.index(), 1u);
+  EXPECT_EQ(jobs[1].tile.index(), 3u);
+  EXPECT_EQ(jobs[2].tile.index(), 2u);
+}
+
+TEST_F(TileScheduleTest, pictures_come_at_doubling_sample_counts) {
+  schedule.replace({request(1, 0.1f)}, nothing_stored);
+  std::vector<float> published;
+  for (int i = 0; i < 200; ++i) {
+    for (const auto& job : schedule.next_batch(1)) {
+      counts[job.tile] += 1;
+      schedule.shaded(job.tile, at(counts[job.tile]), 10);
+    }
+    if (!publish().empty()) published.push_back(counts[TileId(0, 1)]);
+  }
+  EXPECT_EQ(published, (std::vector<float>{1, 2, 4, 8, 16, 32, 64, 128}));
+}
+
+TEST_F(TileScheduleTest, work_ends_at_max_samples_with_a_last_picture) {
+  ScheduleOptions options;
+  options.max_samples = 100;
+  schedule = TileSchedule(kLevels, options);
+  schedule.replace({request(1, 0.1f)}, nothing_stored);
+  std::vector<float> published;
+  for (int i = 0; i < 100; ++i) {
+    run(1);
+    if (!publish().empty()) published.push_back(counts[TileId(0, 1)]);
+  }
+  EXPECT_EQ(published.back(), 100.0f);
+  EXPECT_TRUE(schedule.next_batch(1000).empty());
+}
+
+TEST_F(TileScheduleTest, tile_under_its_error_target_stops) {
+  ScheduleOptions options;
+  options.target_error = 0.02f;
+  schedule = TileSchedule(kLevels, options);
+  schedule.replace({request(1, 0.1f)}, nothing_stored);
+  for (int i = 0; i < 200 && !schedule.next_batch(1).empty(); ++i) {
+    run(1);
+    publish(0.01f);
+  }
+  EXPECT_GE(counts[TileId(0, 1)], 16.0f);
+  EXPECT_LT(counts[TileId(0, 1)], 64.0f);
+}
+
+TEST_F(TileScheduleTest, newly_seen_texels_are_shaded_and_shown_at_once) {
+  schedule.replace({request(1, 0.1f)}, nothing_stored);
+  for (int i = 0; i < 5; ++i) run(1);
+  publish();
+  auto more = request(1, 0.1f);
+  for (int x = 0; x < 10; ++x) more.mask.set(x, 5);
+  schedule.replace({more}, [](TileId) { return true; });
+  auto jobs = schedule.next_batch(1000);
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0].passes, 0u);
+  TileProgress half = at(10, 20);
+  half.least = 0;
+  half.unshaded = 10;
+  schedule.shaded(jobs[0].tile, half, 0);
+  jobs = schedule.next_batch(1000);
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0].cost, 10u);
+  schedule.shaded(jobs[0].tile, at(10, 20), 10);
+  EXPECT_EQ(publish(), std::vector<std::uint32_t>{1});
+}
+
+TEST_F(TileScheduleTest, neighbours_first_light_renews_the_border_when_all_is_calm) {
+  schedule.replace({request(1, 0.9f), request(2, 0.1f), request(9, 0.01f)}, nothing_stored);
+  run(1);
+  EXPECT_EQ(publish(), std::vector<std::uint32_t>{1});
+  run(1);
+  EXPECT_EQ(publish(), std::vector<std::uint32_t>{2});
+  run(1);  // no first pass waits any longer
+  EXPECT_EQ(publish(), (std::vector<std::uint32_t>{1, 9}));
+}
+
+TEST_F(TileScheduleTest, border_tiles_are_shaded_but_have_no_picture) {
+  schedule.replace({request(1, 0.1f), request(2, 0.1f, false)}, nothing_stored);
+  run(1000);
+  EXPECT_EQ(counts.size(), 2u);
+  EXPECT_EQ(publish(), std::vector<std::uint32_t>{1});
+}
+
+TEST_F(TileScheduleTest, tile_that_fails_twice_is_left_alone) {
+  schedule.replace({request(1, 0.1f)}, nothing_stored);
+  EXPECT_TRUE(schedule.failed(TileId(0, 1)));
+  EXPECT_EQ(schedule.next_batch(1000).size(), 1u);
+  EXPECT_FALSE(schedule.failed(TileId(0, 1)));
+  EXPECT_TRUE(schedule.next_batch(1000).empty());
+}
+
+TEST(CoarseRoundsTest, rounds_end_and_pictures_come_at_powers_of_two) {
+  CoarseRounds rounds(1, LevelTiles{3, 3}, 10);
+  std::vector<std::uint32_t> pictures;
+  std::uint32_t round = 0;
+  for (int i = 0; i < 1000 && !rounds.finished(); ++i) {
+    for (const auto& job : rounds.next_batch(1500)) round = std::max(round, job.cost == 225 ? 0u : job.most);
+    if (rounds.batch_finished()) pictures.push_back(round);
+  }
+  EXPECT_EQ(pictures, (std::vector<std::uint32_t>{0, 1, 2, 4, 8, 10}));
+  EXPECT_TRUE(rounds.finished());
+}
+
+TEST(CoarseCanvasTest, tiles_without_light_take_the_nearest_colour) {
+  CoarseCanvas canvas(LevelTiles{3, 1}, 7);
+  TileImage image{};
+  image.rgb.fill(90);
+  canvas.put(2, image);
+  const auto picture = canvas.finish();
+  EXPECT_EQ(picture->version, 7u);
+  EXPECT_EQ(picture->width, 90u);
+  EXPECT_EQ(picture->height, 30u);
+  EXPECT_TRUE(std::all_of(picture->rgb.begin(), picture->rgb.end(), [](auto v) { return v == 90; }));
+}
+
+}  // namespace
+}  // namespace darm::renderer
