@@ -1,0 +1,137 @@
+#include "actors/session/send_queue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace darm::session {
+namespace {
+// Time for a key frame to be made before it is asked for again.
+constexpr Microseconds kKeyPatience = 1'000'000;
+}  // namespace
+
+void SendQueue::push_control(Packet packet) {
+  control_waiting_bytes_ += packet.size();
+  items_.push_back({Kind::kControl, std::move(packet), nullptr, {}, 0, 0});
+}
+
+void SendQueue::push_bulk(Packet packet) {
+  ++bulk_waiting_;
+  items_.push_back({Kind::kBulk, std::move(packet), nullptr, {}, 0, 0});
+}
+
+void SendQueue::push_coarse(Packet packet) {
+  const auto old = std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kCoarse; });
+  if (old != items_.end()) {
+    old->packet = std::move(packet);
+    return;
+  }
+  items_.push_back({Kind::kCoarse, std::move(packet), nullptr, {}, 0, 0});
+}
+
+bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer,
+                             Microseconds now) {
+  const auto oldest =
+      std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kPicture; });
+  const bool late = oldest != items_.end() && now - oldest->since > limits_.media_age;
+  // A single picture may be of any size; only a queue of them is bounded.
+  const bool full = pictures_waiting_ > 0 && picture_waiting_bytes_ + size_of(*frame) > limits_.media_bytes;
+  if (late || full) drop_pictures();
+  // A key frame makes what waits before it useless, and stands for it.
+  if (frame->key && pictures_waiting_ > 0) drop_pictures();
+  if (bulk_waiting_ > 0 || (key_needed_ && !frame->key)) {
+    key_needed_ = true;
+    ++pictures_dropped_;
+    keep_answer(answer);
+    return false;
+  }
+  key_needed_ = false;
+  key_asked_.reset();
+  picture_waiting_bytes_ += size_of(*frame);
+  ++pictures_waiting_;
+  items_.push_back({Kind::kPicture, {}, frame, answer, 0, now});
+  return true;
+}
+
+void SendQueue::push_no_change(const NoChange& event) {
+  if (key_needed_) {
+    keep_answer(event.answer);
+    return;
+  }
+  items_.push_back({Kind::kNoChange, {}, nullptr, event.answer, event.error, 0});
+}
+
+void SendQueue::keep_answer(const ViewAnswer& answer) {
+  if (answer.sequence > lost_answer_.sequence) lost_answer_ = answer;
+}
+
+void SendQueue::attach_lost_answer(ViewAnswer& answer) {
+  if (lost_answer_.sequence > answer.sequence) {
+    // The later picture shows what the lost one would have; the times of its making are its own.
+    auto stamps = lost_answer_.stamps;
+    stamps.encode_started = answer.stamps.encode_started;
+    stamps.picture_composed = answer.stamps.picture_composed;
+    stamps.encoded = answer.stamps.encoded;
+    answer.sequence = lost_answer_.sequence;
+    answer.stamps = stamps;
+  }
+  lost_answer_ = {};
+}
+
+void SendQueue::drop_pictures() {
+  for (const auto& i : items_) {
+    if (i.kind == Kind::kPicture || i.kind == Kind::kNoChange) keep_answer(i.answer);
+    if (i.kind == Kind::kPicture) ++pictures_dropped_;
+  }
+  std::erase_if(items_, [](const Item& i) { return i.kind == Kind::kPicture || i.kind == Kind::kNoChange; });
+  pictures_waiting_ = 0;
+  picture_waiting_bytes_ = 0;
+  key_needed_ = true;
+}
+
+std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
+  if (under_way_since_ || items_.empty()) return std::nullopt;
+  Item item = std::move(items_.front());
+  items_.pop_front();
+  under_way_since_ = now;
+  switch (item.kind) {
+    case Kind::kControl:
+      control_waiting_bytes_ -= item.packet.size();
+      return std::move(item.packet);
+    case Kind::kBulk:
+      --bulk_waiting_;
+      return std::move(item.packet);
+    case Kind::kCoarse:
+      return std::move(item.packet);
+    case Kind::kPicture:
+      --pictures_waiting_;
+      picture_waiting_bytes_ -= size_of(*item.frame);
+      attach_lost_answer(item.answer);
+      item.answer.stamps.sent = now;
+      return make(item.frame, item.answer);
+    case Kind::kNoChange: {
+      item.answer.stamps.sent = now;
+      return make_answer(NoChange(item.answer, item.error));
+    }
+  }
+  return std::nullopt;
+}
+
+bool SendQueue::ask_for_key(Microseconds now) {
+  if (!key_needed_ || bulk_waiting_ > 0 || pictures_waiting_ > 0) return false;
+  if (under_way_since_ && now - *under_way_since_ > limits_.media_age) return false;  // it would only wait behind this
+  if (key_asked_ && now - *key_asked_ < kKeyPatience) return false;
+  key_asked_ = now;
+  return true;
+}
+
+bool SendQueue::too_slow(Microseconds now) const {
+  return (under_way_since_ && now - *under_way_since_ > limits_.grace) ||
+         control_waiting_bytes_ > limits_.control_bytes;
+}
+
+void SendQueue::clear() {
+  items_.clear();
+  bulk_waiting_ = control_waiting_bytes_ = picture_waiting_bytes_ = pictures_waiting_ = 0;
+}
+
+}  // namespace darm::session

@@ -1,0 +1,86 @@
+// What a session still has to send, in order; decides which pictures are dropped when the client cannot keep up.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <optional>
+
+#include "actors/session/bytes.hpp"
+#include "actors/session/session_messages.hpp"
+
+namespace darm::session {
+
+struct SendLimits {
+  std::size_t media_bytes = 4u << 20;     ///< pictures waiting behind another picture
+  Microseconds media_age = 500'000;       ///< age at which a waiting picture is too old to be of use
+  std::size_t control_bytes = 16u << 20;  ///< control messages waiting
+  Microseconds grace = 15'000'000;        ///< a packet that takes longer than this: the client does not read
+};
+
+/// First in, first out. Control messages and geometry are never dropped. Pictures are dropped whole, and all that wait
+/// together with the new one, because each builds on the one before; then only a key frame is taken. While geometry
+/// waits no picture is taken. The answer of a dropped picture travels with the next one that is sent. No clock inside:
+/// `now` must not decrease.
+class SendQueue {
+ public:
+  explicit SendQueue(const SendLimits& limits) : limits_(limits) {}
+
+  void push_control(Packet packet);
+  void push_bulk(Packet packet);
+  /// Replaces a coarse texture that still waits.
+  void push_coarse(Packet packet);
+  /// False: dropped (and with it whatever pictures waited).
+  bool push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer, Microseconds now);
+  /// An answer without a picture. Kept back for the next picture if the client is waiting for a key frame.
+  void push_no_change(const NoChange& event);
+
+  /// The next packet, if none is under way. `make` turns a picture into bytes when its turn comes.
+  using MakePicture = std::function<Packet(const std::shared_ptr<const EncodedFrame>&, const ViewAnswer&)>;
+  using MakeNoChange = std::function<Packet(const NoChange&)>;
+  [[nodiscard]] std::optional<Packet> take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
+  /// The packet under way is out.
+  void sent() { under_way_since_.reset(); }
+
+  /// True when a key frame should be asked for: one is needed, there is room for it, and none was asked for lately.
+  [[nodiscard]] bool ask_for_key(Microseconds now);
+  /// Something is lost on the client's side: pictures are of no use until the next key frame.
+  void require_key() { key_needed_ = true; }
+  [[nodiscard]] bool too_slow(Microseconds now) const;
+  /// Drops everything that waits; what is under way stays so.
+  void clear();
+  [[nodiscard]] bool idle() const { return items_.empty() && !under_way_since_; }
+  [[nodiscard]] bool bulk_waits() const { return bulk_waiting_ > 0; }
+  [[nodiscard]] std::size_t pictures_dropped() const { return pictures_dropped_; }
+
+ private:
+  enum class Kind : std::uint8_t { kControl, kBulk, kCoarse, kPicture, kNoChange };
+  struct Item {
+    Kind kind;
+    Packet packet;  // control, bulk, coarse
+    std::shared_ptr<const EncodedFrame> frame;
+    ViewAnswer answer;
+    float error = 0;
+    Microseconds since = 0;
+  };
+  static std::size_t size_of(const EncodedFrame& frame) {
+    return frame.h264.size() + frame.lossless.size() * sizeof(TileImage::rgb) + frame.edits.size() * 8;
+  }
+  void drop_pictures();
+  void keep_answer(const ViewAnswer& answer);
+  void attach_lost_answer(ViewAnswer& answer);
+
+  SendLimits limits_;
+  std::deque<Item> items_;
+  std::size_t bulk_waiting_ = 0;
+  std::size_t control_waiting_bytes_ = 0;
+  std::size_t picture_waiting_bytes_ = 0;
+  std::size_t pictures_waiting_ = 0;
+  std::size_t pictures_dropped_ = 0;
+  std::optional<Microseconds> under_way_since_;
+  bool key_needed_ = true;
+  std::optional<Microseconds> key_asked_;
+  ViewAnswer lost_answer_;  // sequence 0: none
+};
+
+}  // namespace darm::session

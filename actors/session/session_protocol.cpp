@@ -1,0 +1,296 @@
+#include "actors/session/session_protocol.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "proto/limits.hpp"
+
+namespace darm::session {
+namespace {
+
+// The smallest PhysTex of the protocol, and the largest a 16-bit slot number can name (less the one for "absent").
+constexpr std::uint32_t kSmallestPhysTex = 1024;
+constexpr std::uint32_t kLargestCoded = 4096;
+constexpr std::uint32_t kLargestLossless = 8192;
+
+Packet packet_of(const wire::Envelope& envelope) {
+  Packet p;
+  p.head = proto::frame(envelope);
+  return p;
+}
+
+Packet packet_of(SharedBytes bytes) {
+  Packet p;
+  p.body = std::move(bytes);
+  return p;
+}
+
+// Printable ASCII only, so that a name cannot forge log lines.
+std::string clean_name(const std::string& text) {
+  std::string out = text.substr(0, proto::kMaxClientName);
+  std::replace_if(out.begin(), out.end(), [](char c) { return c < 0x20 || c > 0x7e; }, '?');
+  return out;
+}
+
+}  // namespace
+
+SessionProtocol::SessionProtocol(SessionId id, const SessionPolicy& policy, std::string key, std::uint16_t udp_port,
+                                 std::shared_ptr<const GeometryStream> scene, std::shared_ptr<FrameBodies> bodies,
+                                 Microseconds now)
+    : id_(id),
+      policy_(policy),
+      key_(std::move(key)),
+      udp_port_(udp_port),
+      scene_(std::move(scene)),
+      bodies_(std::move(bodies)),
+      reader_(proto::kMaxClientEnvelope),
+      queue_(policy.send),
+      started_(now),
+      heard_(now) {}
+
+Actions SessionProtocol::on_bytes(std::span<const std::uint8_t> bytes, Microseconds now) {
+  Actions actions;
+  if (state_ == State::kClosing || state_ == State::kClosed) return actions;
+  reader_.feed(bytes);
+  wire::Envelope envelope;
+  while (state_ == State::kAwaitHello || state_ == State::kOpen) {
+    const auto got = reader_.next(envelope);
+    if (!got) {
+      actions.push_back(Noted{"bad_framing"});
+      close(wire::Goodbye::PROTOCOL_ERROR, "The stream cannot be read: " + got.error() + ".", now);
+      break;
+    }
+    if (!*got) break;
+    heard_ = now;
+    on_envelope(envelope, now, actions);
+  }
+  return actions;
+}
+
+void SessionProtocol::on_envelope(const wire::Envelope& envelope, Microseconds now, Actions& actions) {
+  using Body = wire::Envelope::BodyCase;
+  const auto body = envelope.body_case();
+  if (body == Body::kGoodbye) {
+    state_ = State::kClosed;
+    end_ = "the client left";
+    queue_.clear();
+    return;
+  }
+  if (state_ == State::kAwaitHello) {
+    if (body == Body::kHello) {
+      on_hello(envelope.hello(), now, actions);
+    } else {
+      close(wire::Goodbye::PROTOCOL_ERROR, "The first message must be Hello.", now);
+    }
+    return;
+  }
+  switch (body) {
+    case Body::kCamera:
+      return on_camera(envelope.camera(), now, actions);
+    case Body::kFeedback:
+      return on_feedback(envelope.feedback(), actions);
+    case Body::kPing:
+      return on_ping(envelope.ping());
+    case Body::kPong:
+      return;
+    case Body::BODY_NOT_SET:
+      return;  // a message of a later minor version: ignored, like unknown fields
+    default:
+      return fault("unexpected_message", now, actions);
+  }
+}
+
+std::optional<tile_scheduler::StreamFormat> SessionProtocol::negotiate(const wire::Hello& hello) const {
+  const std::uint32_t wanted = hello.max_phystex() == 0 ? policy_.phystex_size : hello.max_phystex();
+  if (wanted < kSmallestPhysTex) return std::nullopt;
+  tile_scheduler::StreamFormat format;
+  if (hello.lossless()) {
+    if (!policy_.allow_lossless) return std::nullopt;
+    format.lossless_rgb = true;
+    format.phystex_size = std::min(std::bit_floor(wanted), kLargestLossless);
+    return format;
+  }
+  format.phystex_size = std::min(std::bit_floor(std::min(wanted, policy_.phystex_size)), kLargestCoded);
+  format.chroma_444 = hello.chroma_444() && policy_.allow_chroma_444;
+  return format;
+}
+
+void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actions& actions) {
+  client_name_ = clean_name(hello.client());
+  if (hello.version() != proto::kProtocolVersion) {
+    return close(wire::Goodbye::VERSION_UNSUPPORTED,
+                 "This server speaks protocol version " + std::to_string(proto::kProtocolVersion) +
+                     ", the client asked for " + std::to_string(hello.version()) + ".",
+                 now);
+  }
+  const auto format = negotiate(hello);
+  if (!format) {
+    return close(wire::Goodbye::FORMAT_REFUSED,
+                 hello.lossless() && !policy_.allow_lossless
+                     ? "This server does not send lossless tiles; ask without, or allow them in its configuration."
+                     : "The client cannot take a PhysTex of at least 1024 pixels.",
+                 now);
+  }
+  auto eye = policy_.start.position;
+  if (hello.has_pose()) {
+    if (const auto pose = parse_pose(hello.pose())) {
+      eye = pose->camera.position;
+    } else {
+      fault("bad_pose", now, actions);
+    }
+  }
+  state_ = State::kOpen;
+  send_welcome(*format);
+  send_scene(eye);
+  actions.push_back(tile_scheduler::SessionOpened(id_, *format));
+  actions.push_back(encoder::CoarseWanted(id_));
+}
+
+void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format) {
+  wire::Envelope envelope;
+  auto* w = envelope.mutable_welcome();
+  w->set_version(proto::kProtocolVersion);
+  w->set_session(static_cast<std::uint64_t>(id_));
+  w->set_key(key_);
+  w->set_udp_port(udp_port_);
+  w->set_phystex_size(format.phystex_size);
+  w->set_chroma_444(format.chroma_444);
+  w->set_lossless(format.lossless_rgb);
+  put_pose(policy_.start, policy_.start_viewport, *w->mutable_start());
+  w->set_updates_per_second(policy_.updates_per_second);
+  w->set_server(policy_.server);
+  send(envelope);
+}
+
+void SessionProtocol::send_scene(const glm::dvec3& eye) {
+  queue_.push_bulk(packet_of(scene_->manifest()));
+  for (const auto index : scene_->nearest_first(eye)) queue_.push_bulk(packet_of(scene_->chunk(index)));
+}
+
+void SessionProtocol::on_camera(const wire::CameraUpdate& update, Microseconds now, Actions& actions) {
+  const auto pose = parse_pose(update.pose());
+  if (!pose) return fault("bad_pose", now, actions);
+  if (update.sequence() <= newest_camera_) {
+    actions.push_back(Noted{"old_camera"});  // overtaken on the way (UDP and TCP may cross): not the client's fault
+    return;
+  }
+  newest_camera_ = update.sequence();
+  FrameStamps stamps;
+  stamps.client_sent = update.client_time_us();
+  stamps.camera_received = now;
+  actions.push_back(tile_scheduler::ViewChanged(id_, newest_camera_, pose->camera, pose->viewport, stamps));
+}
+
+void SessionProtocol::on_feedback(const wire::Feedback& feedback, Actions& actions) {
+  if (!feedback.key_frame_wanted()) return;
+  queue_.require_key();
+  actions.push_back(tile_scheduler::KeyFrameWanted(id_));
+}
+
+void SessionProtocol::on_ping(const wire::Ping& ping) {
+  wire::Envelope pong;
+  pong.mutable_pong()->set_time_us(ping.time_us());
+  send(pong);
+}
+
+void SessionProtocol::fault(std::string_view what, Microseconds now, Actions& actions) {
+  actions.push_back(Noted{what});
+  if (++faults_ > policy_.max_protocol_errors) {
+    close(wire::Goodbye::PROTOCOL_ERROR, "Too many messages that make no sense here.", now);
+  }
+}
+
+Actions SessionProtocol::on_datagram(const wire::DatagramBody& body, Microseconds now) {
+  Actions actions;
+  if (state_ != State::kOpen) return actions;
+  heard_ = now;
+  switch (body.body_case()) {
+    case wire::DatagramBody::kCamera:
+      on_camera(body.camera(), now, actions);
+      break;
+    case wire::DatagramBody::kFeedback:
+      on_feedback(body.feedback(), actions);
+      break;
+    case wire::DatagramBody::kPing:
+      on_ping(body.ping());
+      break;
+    case wire::DatagramBody::BODY_NOT_SET:
+      break;
+  }
+  return actions;
+}
+
+Actions SessionProtocol::on_frame(const FrameEncoded& event, Microseconds now) {
+  Actions actions;
+  if (state_ != State::kOpen || !event.frame) return actions;
+  if (!queue_.push_picture(event.frame, event.answer, now)) actions.push_back(Noted{"picture_dropped"});
+  ask_for_key(now, actions);
+  return actions;
+}
+
+void SessionProtocol::on_no_change(const NoChange& event) {
+  if (state_ == State::kOpen) queue_.push_no_change(event);
+}
+
+void SessionProtocol::on_coarse(const CoarseUpdated& event) {
+  if (state_ != State::kOpen || !event.coarse || event.coarse->version <= coarse_version_) return;
+  coarse_version_ = event.coarse->version;
+  queue_.push_coarse(packet_of(coarse_message(*event.coarse)));
+}
+
+void SessionProtocol::ask_for_key(Microseconds now, Actions& actions) {
+  if (state_ == State::kOpen && queue_.ask_for_key(now)) actions.push_back(tile_scheduler::KeyFrameWanted(id_));
+}
+
+Actions SessionProtocol::on_sent(Microseconds now) {
+  Actions actions;
+  queue_.sent();
+  // Pictures were turned away while geometry went out: now there is room.
+  if (queue_.pictures_dropped() > 0) ask_for_key(now, actions);
+  return actions;
+}
+
+Actions SessionProtocol::on_tick(Microseconds now) {
+  Actions actions;
+  if (state_ == State::kAwaitHello && now - started_ > policy_.handshake_timeout) {
+    close(wire::Goodbye::TIMED_OUT, "No Hello came in time.", now);
+  } else if (state_ == State::kOpen && now - heard_ > policy_.idle_timeout) {
+    close(wire::Goodbye::TIMED_OUT, "Nothing was heard from the client for too long.", now);
+  } else if (state_ == State::kOpen && queue_.too_slow(now)) {
+    close(wire::Goodbye::TOO_SLOW, "The client does not read what it is sent.", now);
+  }
+  if (queue_.pictures_dropped() > 0) ask_for_key(now, actions);
+  return actions;
+}
+
+void SessionProtocol::close(wire::Goodbye::Reason reason, std::string text, Microseconds now) {
+  if (state_ == State::kClosing || state_ == State::kClosed) return;
+  state_ = State::kClosing;
+  closing_since_ = now;
+  text.resize(std::min(text.size(), proto::kMaxGoodbyeText));
+  end_ = wire::Goodbye::Reason_Name(reason) + ": " + text;
+  queue_.clear();
+  wire::Envelope envelope;
+  envelope.mutable_goodbye()->set_reason(reason);
+  envelope.mutable_goodbye()->set_text(std::move(text));
+  send(envelope);
+}
+
+void SessionProtocol::send(const wire::Envelope& envelope) { queue_.push_control(packet_of(envelope)); }
+
+std::optional<Packet> SessionProtocol::next_packet(Microseconds now) {
+  return queue_.take(
+      now,
+      [this](const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer) {
+        return frame_packet(*bodies_, frame, answer);
+      },
+      [](const NoChange& event) { return packet_of(no_change_message(event)); });
+}
+
+bool SessionProtocol::finished(Microseconds now) const {
+  if (state_ == State::kClosed) return true;
+  return state_ == State::kClosing && (queue_.idle() || now - closing_since_ > policy_.goodbye_timeout);
+}
+
+}  // namespace darm::session

@@ -1,0 +1,110 @@
+// What a session says and when, without socket, clock or thread: bytes, events and the time go in, actions come out.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "actors/encoder/encoder_messages.hpp"
+#include "actors/session/frame_message.hpp"
+#include "actors/session/geometry_stream.hpp"
+#include "actors/session/send_queue.hpp"
+#include "actors/session/session_messages.hpp"
+#include "actors/tile_scheduler/tile_scheduler_messages.hpp"
+#include "proto/darm.pb.h"
+#include "proto/framing.hpp"
+
+namespace darm::session {
+
+/// What the daemon offers its clients.
+struct SessionPolicy {
+  std::uint32_t phystex_size = 2048;  ///< most a client gets: 1024, 2048 or 4096
+  bool allow_chroma_444 = true;
+  bool allow_lossless = false;  ///< tiles without codec, PhysTex up to 8192 (evaluation)
+  float updates_per_second = 10.0f;
+  Camera start;  ///< where a client without a pose begins
+  Viewport start_viewport;
+  std::string server = "darmd";
+  Microseconds handshake_timeout = 5'000'000;
+  Microseconds idle_timeout = 30'000'000;
+  Microseconds goodbye_timeout = 2'000'000;  ///< for the last message to leave
+  unsigned max_protocol_errors = 16;
+  SendLimits send;
+};
+
+/// Something worth a number: `what` is from a small fixed set, for metrics.
+struct Noted {
+  std::string_view what;
+};
+
+/// What others are told. In order.
+using Action = std::variant<tile_scheduler::SessionOpened, tile_scheduler::ViewChanged, tile_scheduler::KeyFrameWanted,
+                            encoder::CoarseWanted, Noted>;
+using Actions = std::vector<Action>;
+
+/// One client from its first byte to its last: Hello, Welcome, manifest, geometry nearest first, CoarseTex, pictures.
+/// `now` is in microseconds and must not decrease.
+class SessionProtocol {
+ public:
+  /// `key`: 32 random bytes. `udp_port`: 0 if there is no UDP. `scene` and `bodies` are shared by all sessions.
+  SessionProtocol(SessionId id, const SessionPolicy& policy, std::string key, std::uint16_t udp_port,
+                  std::shared_ptr<const GeometryStream> scene, std::shared_ptr<FrameBodies> bodies, Microseconds now);
+
+  [[nodiscard]] Actions on_bytes(std::span<const std::uint8_t> bytes, Microseconds now);
+  [[nodiscard]] Actions on_datagram(const wire::DatagramBody& body, Microseconds now);  ///< authenticated before
+  [[nodiscard]] Actions on_frame(const FrameEncoded& event, Microseconds now);
+  [[nodiscard]] Actions on_sent(Microseconds now);
+  [[nodiscard]] Actions on_tick(Microseconds now);
+  void on_no_change(const NoChange& event);
+  void on_coarse(const CoarseUpdated& event);
+
+  /// Says goodbye: what waits is dropped, the goodbye goes out next. The first reason stands.
+  void close(wire::Goodbye::Reason reason, std::string text, Microseconds now);
+
+  /// The next bytes for the socket; nothing while some are under way.
+  [[nodiscard]] std::optional<Packet> next_packet(Microseconds now);
+  /// The connection can be closed.
+  [[nodiscard]] bool finished(Microseconds now) const;
+  /// The reason and sentence of the end, for the log; empty while it goes on.
+  [[nodiscard]] const std::string& end() const { return end_; }
+  [[nodiscard]] bool open() const { return state_ == State::kOpen; }
+  [[nodiscard]] const std::string& client_name() const { return client_name_; }
+
+ private:
+  enum class State : std::uint8_t { kAwaitHello, kOpen, kClosing, kClosed };
+  void on_envelope(const wire::Envelope& envelope, Microseconds now, Actions& actions);
+  void on_hello(const wire::Hello& hello, Microseconds now, Actions& actions);
+  void on_camera(const wire::CameraUpdate& update, Microseconds now, Actions& actions);
+  void on_feedback(const wire::Feedback& feedback, Actions& actions);
+  void on_ping(const wire::Ping& ping);
+  void fault(std::string_view what, Microseconds now, Actions& actions);
+  std::optional<tile_scheduler::StreamFormat> negotiate(const wire::Hello& hello) const;
+  void send(const wire::Envelope& envelope);
+  void send_welcome(const tile_scheduler::StreamFormat& format);
+  void send_scene(const glm::dvec3& eye);
+  void ask_for_key(Microseconds now, Actions& actions);
+
+  SessionId id_;
+  SessionPolicy policy_;
+  std::string key_;
+  std::uint16_t udp_port_;
+  std::shared_ptr<const GeometryStream> scene_;
+  std::shared_ptr<FrameBodies> bodies_;
+  proto::FrameReader reader_;
+  SendQueue queue_;
+  State state_ = State::kAwaitHello;
+  Microseconds started_;
+  Microseconds heard_;
+  Microseconds closing_since_ = 0;
+  CameraSequence newest_camera_ = 0;
+  unsigned faults_ = 0;
+  std::uint32_t coarse_version_ = 0;
+  std::string end_;
+  std::string client_name_;
+};
+
+}  // namespace darm::session
