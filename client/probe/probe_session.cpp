@@ -290,7 +290,7 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   connection_ = std::move(*connection);
   const auto& welcome = connection_->welcome();
   if (plan_.lossless && !welcome.lossless())
-    return fail("server: does not offer lossless streams; set session.allow_lossless there");
+    return fail("server: does not offer lossless streams; its configuration must set stream.allow_lossless");
   shape_ = {welcome.phystex_size(), welcome.chroma_444(), welcome.lossless()};
   report_.server = welcome.server();
   report_.udp = connection_->uses_udp();

@@ -1,0 +1,217 @@
+#include "client/core/connection.hpp"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <functional>
+#include <span>
+#include <thread>
+
+#include "proto/datagram.hpp"
+#include "proto/framing.hpp"
+#include "proto/limits.hpp"
+
+namespace darm::client {
+namespace {
+
+using namespace std::chrono_literals;
+
+// One accepted connection of a server that follows a script.
+class Peer {
+ public:
+  explicit Peer(int fd) : fd_(fd) {}
+  ~Peer() { ::close(fd_); }
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+
+  void send(const wire::Envelope& e) { send_bytes(proto::frame(e)); }
+  void send_bytes(const std::vector<std::uint8_t>& bytes) {
+    EXPECT_EQ(::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+  }
+  wire::Envelope read() {
+    wire::Envelope e;
+    std::uint8_t buffer[4096];
+    for (;;) {
+      const auto got = frames_.next(e);
+      if (!got || *got) return e;
+      const auto n = ::recv(fd_, buffer, sizeof(buffer), 0);
+      if (n <= 0) return {};
+      frames_.feed(std::span(buffer, static_cast<std::size_t>(n)));
+    }
+  }
+
+ private:
+  int fd_;
+  proto::FrameReader frames_{1 << 20};
+};
+
+class FakeServer {
+ public:
+  explicit FakeServer(std::function<void(Peer&)> script) {
+    listener_ = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+    EXPECT_EQ(::listen(listener_, 1), 0);
+    socklen_t size = sizeof(address);
+    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size);
+    port = ntohs(address.sin_port);
+    thread_ = std::thread([this, script = std::move(script)] {
+      Peer peer(::accept(listener_, nullptr, nullptr));
+      script(peer);
+    });
+  }
+  ~FakeServer() {
+    thread_.join();
+    ::close(listener_);
+  }
+  FakeServer(const FakeServer&) = delete;
+  FakeServer& operator=(const FakeServer&) = delete;
+  std::uint16_t port = 0;
+
+ private:
+  int listener_ = -1;
+  std::thread thread_;
+};
+
+wire::Envelope welcome(std::uint32_t udp_port = 0) {
+  wire::Envelope e;
+  e.mutable_welcome()->set_version(proto::kProtocolVersion);
+  e.mutable_welcome()->set_session(77);
+  e.mutable_welcome()->set_key(std::string(proto::kSessionKeyBytes, 'k'));
+  e.mutable_welcome()->set_udp_port(udp_port);
+  e.mutable_welcome()->set_phystex_size(1024);
+  return e;
+}
+
+ConnectOptions to(std::uint16_t port) {
+  ConnectOptions o;
+  o.host = "127.0.0.1";
+  o.port = port;
+  o.lossless = true;
+  o.handshake_timeout = 5s;
+  return o;
+}
+
+TEST(Connection, ShakesHandsTalksAndSaysGoodbye) {
+  FakeServer server([](Peer& peer) {
+    const auto hello = peer.read();
+    EXPECT_TRUE(hello.has_hello());
+    EXPECT_TRUE(hello.hello().lossless());
+    EXPECT_EQ(hello.hello().version(), proto::kProtocolVersion);
+    peer.send(welcome());
+    const auto camera = peer.read();
+    EXPECT_EQ(camera.camera().sequence(), 1u);
+    wire::Envelope ping;
+    ping.mutable_ping()->set_time_us(5);
+    peer.send(ping);
+    wire::Envelope answer;
+    answer.mutable_no_change()->set_answers(1);
+    peer.send(answer);
+    EXPECT_EQ(peer.read().pong().time_us(), 5);
+    EXPECT_EQ(peer.read().goodbye().reason(), wire::Goodbye::CLIENT_LEAVES);
+  });
+  auto connection = Connection::open(to(server.port));
+  ASSERT_TRUE(connection) << connection.error().message;
+  EXPECT_EQ((*connection)->welcome().session(), 77u);
+  EXPECT_FALSE((*connection)->uses_udp());
+  const auto sequence = (*connection)->send_camera(look_at({0, 0, 0}, {1, 0, 0}, 60, 64, 64));
+  ASSERT_TRUE(sequence);
+  EXPECT_EQ(*sequence, 1u);
+  const auto message = (*connection)->next(5s);
+  ASSERT_TRUE(message && *message);
+  EXPECT_EQ((*message)->envelope.no_change().answers(), 1u);
+  EXPECT_EQ((*message)->bytes_total, (*connection)->bytes_received());
+}
+
+TEST(Connection, CamerasGoByAuthenticatedDatagramWhereOffered) {
+  const int udp = ::socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(::bind(udp, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+  socklen_t size = sizeof(address);
+  ::getsockname(udp, reinterpret_cast<sockaddr*>(&address), &size);
+  const std::uint32_t udp_port = ntohs(address.sin_port);
+  FakeServer server([udp_port](Peer& peer) {
+    peer.read();
+    peer.send(welcome(udp_port));
+    peer.read();
+  });
+  auto connection = Connection::open(to(server.port));
+  ASSERT_TRUE(connection) << connection.error().message;
+  ASSERT_TRUE((*connection)->uses_udp());
+  proto::DatagramGate gate(*proto::datagram_key(std::string(32, 'k')), 77);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    ASSERT_TRUE((*connection)->send_camera(look_at({0, 0, 0}, {1, 0, 0}, 60, 64, 64)));
+    std::uint8_t buffer[2048];
+    const auto n = ::recv(udp, buffer, sizeof(buffer), 0);
+    ASSERT_GT(n, 0);
+    wire::DatagramBody body;
+    ASSERT_TRUE(gate.open(std::span(buffer, static_cast<std::size_t>(n)), body));
+    EXPECT_EQ(body.camera().sequence(), i);
+  }
+  ::close(udp);
+}
+
+TEST(Connection, GoodbyeOfTheServerIsTheError) {
+  FakeServer server([](Peer& peer) {
+    peer.read();
+    wire::Envelope e;
+    e.mutable_goodbye()->set_reason(wire::Goodbye::SERVER_FULL);
+    e.mutable_goodbye()->set_text("64 of 64 sessions\nin use");
+    peer.send(e);
+  });
+  const auto connection = Connection::open(to(server.port));
+  ASSERT_FALSE(connection);
+  EXPECT_NE(connection.error().message.find("SERVER_FULL"), std::string::npos) << connection.error().message;
+  EXPECT_EQ(connection.error().message.find('\n'), std::string::npos);
+}
+
+TEST(Connection, HostileLengthsAndGarbageEndIt) {
+  for (const std::vector<std::uint8_t>& bytes : {std::vector<std::uint8_t>{0xff, 0xff, 0xff, 0xff},
+                                                 std::vector<std::uint8_t>{0, 0, 0, 4, 0xff, 0xff, 0xff, 0xff}}) {
+    FakeServer server([&](Peer& peer) {
+      peer.read();
+      peer.send_bytes(bytes);
+    });
+    EXPECT_FALSE(Connection::open(to(server.port)));
+  }
+}
+
+TEST(Connection, VersionsAreRefusedAndSilenceEnds) {
+  {
+    FakeServer server([](Peer& peer) {
+      peer.read();
+      auto e = welcome();
+      e.mutable_welcome()->set_version(9);
+      peer.send(e);
+      peer.read();
+    });
+    EXPECT_FALSE(Connection::open(to(server.port)));
+  }
+  FakeServer server([](Peer& peer) {
+    peer.read();
+    peer.read();
+  });
+  auto options = to(server.port);
+  options.handshake_timeout = 100ms;
+  EXPECT_FALSE(Connection::open(options));
+}
+
+TEST(Connection, AddressesAreParsed) {
+  std::string host;
+  std::uint16_t port = 0;
+  ASSERT_TRUE(parse_address("[::1]:70", host, port));
+  EXPECT_EQ(host, "::1");
+  EXPECT_EQ(port, 70);
+  for (const char* bad : {"", "host", ":5", "host:", "host:0", "host:70000", "host:5x"})
+    EXPECT_FALSE(parse_address(bad, host, port)) << bad;
+}
+
+}  // namespace
+}  // namespace darm::client
