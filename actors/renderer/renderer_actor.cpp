@@ -81,7 +81,8 @@ std::vector<TileJob> RendererActor::choose_jobs() {
   // The coarse level earns its share of what visible tiles cost; with nothing visible it has all.
   std::uint64_t cost = 0;
   for (const auto& job : jobs) cost += job.cost;
-  coarse_credit_ = jobs.empty() ? budget : coarse_credit_ + static_cast<double>(cost) * share / (1.0 - share);
+  coarse_credit_ =
+      jobs.empty() ? budget : coarse_credit_ + static_cast<double>(cost) * share / std::max(1.0 - share, 0.1);
   if (coarse_credit_ < kTileTexels / 2.0) return jobs;
   // A tile has one writer: while the coarse level's tiles are in the working set, its turn on them is skipped.
   const auto visible = static_cast<std::ptrdiff_t>(jobs.size());
