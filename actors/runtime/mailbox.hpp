@@ -70,16 +70,16 @@ class Mailbox<std::variant<Ms...>> {
       const auto slot = latest_.find({type, key});
       if (slot != latest_.end()) {
         displaced.emplace(std::move(slot->second->message));
-        slot->second->message.template emplace<type>(std::move(message));
+        slot->second->message.template emplace<type>(std::forward<M>(message));
         return Delivery::kReplaced;
       }
       if (policy == Overflow::kLatestByKey && bounded_ >= capacity_) return Delivery::kRefusedFull;
-      append(std::move(message), key);
+      append(std::forward<M>(message), key);
       latest_.emplace(std::pair{type, key}, std::prev(queue_.end()));
       return Delivery::kQueued;
     } else {
       if (bounded_ < capacity_) {
-        append(std::move(message), 0);
+        append(std::forward<M>(message), 0);
         return Delivery::kQueued;
       }
       if constexpr (policy == Overflow::kDropOldest) {
@@ -88,7 +88,7 @@ class Mailbox<std::variant<Ms...>> {
           displaced.emplace(std::move(it->message));
           queue_.erase(it);
           --bounded_;
-          append(std::move(message), 0);
+          append(std::forward<M>(message), 0);
           return Delivery::kMadeRoom;
         }
       }
@@ -131,7 +131,7 @@ class Mailbox<std::variant<Ms...>> {
   void append(M&& message, std::uint64_t key) {
     constexpr bool latest = M::kOverflow == Overflow::kLatestOnly || M::kOverflow == Overflow::kLatestByKey;
     constexpr bool counted = M::kOverflow != Overflow::kLatestOnly;
-    queue_.push_back(Entry{Inbox(std::in_place_type<M>, std::move(message)), key, latest, counted});
+    queue_.push_back(Entry{Inbox(std::in_place_type<M>, std::forward<M>(message)), key, latest, counted});
     if (counted) ++bounded_;
   }
 

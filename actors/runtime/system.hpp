@@ -40,7 +40,9 @@ class System {
     A* raw = actor.get();
     cell->adopt(
         std::move(actor), [raw] { raw->on_start(); },
-        [raw](Inbox&& inbox) { std::visit([raw](auto&& message) { raw->on(std::move(message)); }, std::move(inbox)); });
+        [raw](Inbox&& inbox) {
+          std::visit([raw]<class M>(M&& message) { raw->on(std::forward<M>(message)); }, std::move(inbox));
+        });
     if (!admit(cell)) {
       cell->abandon();
       return {};

@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# From a fresh Debian 12 to the running daemon: packages, release build, `darmd serve` on the default scene. Run it again
+# at any time: it does only what is missing. --build-only stops after the build; other arguments go to `darmd serve`.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+build_only=false
+serve=()
+for argument in "$@"; do
+  case "$argument" in
+    --build-only) build_only=true ;;
+    -h | --help) sed -n '2,3s/^# //p' "$0"; exit 0 ;;
+    *) serve+=("$argument") ;;
+  esac
+done
+
+echo "== 1/3 packages"
+./deploy/install_dependencies.sh
+
+echo "== 2/3 build (release; some minutes the first time)"
+if [[ ! -f build/release/build.ninja ]]; then
+  # Debian's compiler, whatever CC and CXX say; the daemon alone needs no tests.
+  env -u CC -u CXX cmake --preset release -DDARM_TESTS=OFF
+fi
+targets=(darmd darm-probe)
+NINJA_STATUS='[%f/%t %es] ' ninja -C build/release "${targets[@]}"
+if $build_only; then
+  echo "built: build/release/bin/darmd and darm-probe"
+  exit 0
+fi
+
+echo "== 3/3 serve"
+mkdir -p state
+cat <<'TEXT'
+The daemon prints a ready line with its addresses once clients can connect; stop it with Ctrl-C. Then, in another terminal:
+
+  build/release/bin/darm-probe --server 127.0.0.1:9010 --camera door --size 1280x720 --seconds 20 --out picture.png
+
+A camera is a name from config/scenes/default.toml or "px,py,pz tx,ty,tz fovy". Metrics: http://127.0.0.1:9090/metrics
+TEXT
+exec build/release/bin/darmd serve --config config/scenes/default.toml --state-dir state "${serve[@]}"
