@@ -28,7 +28,7 @@ def length(a): return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 def unit(a):
     n = length(a)
-    return (a[0] / n, a[1] / n, a[2] / n) if n > 1e-12 else (0.0, 1.0, 0.0)
+    return (a[0] / n, a[1] / n, a[2] / n) if n > 1e-20 else (0.0, 1.0, 0.0)
 
 
 # --- shapes --------------------------------------------------------------------------------------------------------
@@ -143,8 +143,8 @@ def window_wall():
     for c in centres:
         depth = (0, 0, inner - outer)
         s.quad((c - half, sill, inner), (2 * half, 0, 0), (0, 0, outer - inner), 2, 1)                # the sill
-        s.quad((c - half, sill, outer), depth, (0, spring - sill, 0), 1, 3)                           # its sides
-        s.quad((c + half, sill, inner), (0, 0, outer - inner), (0, spring - sill, 0), 1, 3)
+        s.quad((c - half, sill, inner), (0, 0, outer - inner), (0, spring - sill, 0), 1, 3)           # its sides
+        s.quad((c + half, sill, outer), depth, (0, spring - sill, 0), 1, 3)
 
         def arc(u, c=c):
             a = math.pi * (1 - u)
@@ -171,7 +171,7 @@ def vault():
         a = v * math.pi
         return (-6 + 12 * u, 5 + 3 * math.sin(a), -3 * math.cos(a))
     # Seen from below: the front looks inwards.
-    return s.grid(lambda u, v: point(u, 1 - v), 12, 36, lambda u, v: (12 * u, 9.4 * v))
+    return s.grid(point, 12, 36, lambda u, v: (12 * u, 9.4 * v))
 
 
 def rib():
@@ -181,9 +181,9 @@ def rib():
     def at(radius, x, v):
         a = v * math.pi
         return (x, 5 + radius * math.sin(a), -radius * math.cos(a))
-    s.grid(lambda u, v: at(r, -w + 2 * w * u, 1 - v), 2, 36)
-    s.grid(lambda u, v: at(r + 0.16 * u, w, 1 - v), 1, 36)
-    s.grid(lambda u, v: at(r + 0.16 * (1 - u), -w, 1 - v), 1, 36)
+    s.grid(lambda u, v: at(r, -w + 2 * w * u, v), 2, 36)
+    s.grid(lambda u, v: at(r + 0.16 * u, w, v), 1, 36)
+    s.grid(lambda u, v: at(r + 0.16 * (1 - u), -w, v), 1, 36)
     return s
 
 
@@ -192,7 +192,8 @@ def column():
     s.box((-0.32, 0, -0.32), (0.32, 0.16, 0.32))
     bulge = lambda y, height, r, out: lambda t: (r + out * math.sin(math.pi * t), y + height * t)
     s.revolve(bulge(0.16, 0.14, 0.24, 0.07), 20, 5)
-    s.revolve(bulge(0.30, 0.08, 0.23, 0.04), 20, 3)
+    s.revolve(bulge(0.30, 0.08, 0.24, 0.04), 20, 3)
+    s.revolve(lambda t: (0.24 - 0.025 * t, 0.38), 20, 1)
     s.revolve(lambda t: (0.215 - 0.035 * t * t, 0.38 + 3.82 * t), 20, 8)
     s.revolve(bulge(4.20, 0.08, 0.18, 0.03), 20, 3)
     s.revolve(lambda t: (0.18 + 0.13 * t * t, 4.28 + 0.34 * t), 20, 5)
@@ -265,7 +266,9 @@ def pot():
     s = Shape()
     s.revolve(lambda t: (0.16 + 0.09 * t, 0.38 * t), 28, 4)
     s.revolve(lambda t: (0.27 - 0.02 * (1 - math.sin(math.pi * t)), 0.38 + 0.06 * t), 28, 4)
-    s.revolve(lambda t: (0.25 - 0.249 * t, 0.40), 28, 1)
+    s.revolve(lambda t: (0.25 - 0.02 * t, 0.44), 28, 1)
+    s.revolve(lambda t: (0.23, 0.44 - 0.04 * t), 28, 1)
+    s.revolve(lambda t: (0.23 - 0.229 * t, 0.40), 28, 1)
     return s
 
 
@@ -573,7 +576,7 @@ def main():
     build_furniture(glb)
     build_glass(glb)
     build_lamps(glb)
-    glb.camera("hall", (-5.3, 1.75, -1.2), (2.2, 1.9, 0.7), 55)
+    glb.camera("hall", (-5.6, 1.75, -0.5), (2.0, 2.4, 0.4), 58)
     glb.camera("table", (2.6, 1.65, -2.2), (0.7, 0.95, 0.5), 48)
     glb.camera("mirror", (-2.2, 1.6, -0.9), (-6.0, 1.7, 0.25), 50)
     glb.camera("windows", (4.9, 1.9, 1.8), (-2.0, 1.7, -2.0), 58)
