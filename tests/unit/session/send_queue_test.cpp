@@ -1,0 +1,181 @@
+#include "actors/session/send_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace darm::session {
+namespace {
+
+Packet bytes(std::size_t n) {
+  Packet p;
+  p.head.resize(n);
+  return p;
+}
+
+std::shared_ptr<const EncodedFrame> picture(FrameNumber number, bool key, std::size_t size = 100) {
+  auto f = std::make_shared<EncodedFrame>();
+  f->frame = number;
+  f->key = key;
+  f->h264.resize(size);
+  return f;
+}
+
+ViewAnswer answer(CameraSequence sequence) {
+  ViewAnswer a;
+  a.sequence = sequence;
+  return a;
+}
+
+// Takes packets and remembers which pictures and answers went out.
+struct Taker {
+  std::vector<FrameNumber> frames;
+  std::vector<CameraSequence> answers;
+  std::optional<Packet> take(SendQueue& q, Microseconds now) {
+    return q.take(
+        now,
+        [this](const auto& f, const ViewAnswer& a) {
+          frames.push_back(f->frame);
+          answers.push_back(a.sequence);
+          return bytes(1);
+        },
+        [this](const NoChange& e) {
+          answers.push_back(e.answer.sequence);
+          return bytes(1);
+        });
+  }
+};
+
+TEST(SendQueue, starts_with_a_key_frame) {
+  SendQueue q{SendLimits{}};
+  EXPECT_FALSE(q.push_picture(picture(1, false), answer(0), 0));
+  EXPECT_TRUE(q.ask_for_key(0));
+  EXPECT_FALSE(q.ask_for_key(10));  // asked a moment ago
+  EXPECT_TRUE(q.push_picture(picture(2, true), answer(0), 20));
+  EXPECT_TRUE(q.push_picture(picture(3, false), answer(0), 30));
+  EXPECT_FALSE(q.ask_for_key(5'000'000));
+}
+
+TEST(SendQueue, one_packet_at_a_time_in_order) {
+  SendQueue q{SendLimits{}};
+  Taker t;
+  q.push_control(bytes(3));
+  q.push_bulk(bytes(5));
+  EXPECT_EQ(t.take(q, 0)->size(), 3u);
+  EXPECT_FALSE(t.take(q, 0).has_value());
+  q.sent();
+  EXPECT_EQ(t.take(q, 0)->size(), 5u);
+  q.sent();
+  EXPECT_TRUE(q.idle());
+}
+
+TEST(SendQueue, pictures_wait_until_the_geometry_is_out) {
+  SendQueue q{SendLimits{}};
+  Taker t;
+  q.push_bulk(bytes(5));
+  EXPECT_FALSE(q.push_picture(picture(1, true), answer(9), 0));
+  EXPECT_FALSE(q.ask_for_key(0));
+  t.take(q, 0);
+  q.sent();
+  EXPECT_TRUE(q.ask_for_key(0));
+  EXPECT_TRUE(q.push_picture(picture(2, true), answer(0), 0));
+  t.take(q, 0);
+  EXPECT_EQ(t.answers, std::vector<CameraSequence>{9});  // the dropped picture's answer was not lost
+}
+
+TEST(SendQueue, what_waits_too_long_goes_with_all_that_builds_on_it) {
+  SendLimits limits;
+  limits.media_age = 100;
+  SendQueue q{limits};
+  Taker t;
+  q.push_control(bytes(1));
+  t.take(q, 0);  // keeps the socket busy
+  EXPECT_TRUE(q.push_picture(picture(1, true), answer(1), 0));
+  EXPECT_TRUE(q.push_picture(picture(2, false), answer(2), 50));
+  EXPECT_FALSE(q.push_picture(picture(3, false), answer(3), 101));
+  EXPECT_EQ(q.pictures_dropped(), 3u);
+  q.sent();
+  EXPECT_TRUE(q.ask_for_key(102));
+  EXPECT_TRUE(q.push_picture(picture(4, true), answer(0), 103));
+  t.take(q, 104);
+  EXPECT_EQ(t.frames, std::vector<FrameNumber>{4});
+  EXPECT_EQ(t.answers, std::vector<CameraSequence>{3});
+}
+
+TEST(SendQueue, a_single_picture_may_be_of_any_size) {
+  SendLimits limits;
+  limits.media_bytes = 50;
+  SendQueue q{limits};
+  EXPECT_TRUE(q.push_picture(picture(1, true, 1000), answer(0), 0));
+  EXPECT_FALSE(q.push_picture(picture(2, false, 1000), answer(0), 0));
+}
+
+TEST(SendQueue, no_change_waits_for_the_key_frame) {
+  SendQueue q{SendLimits{}};
+  Taker t;
+  q.push_no_change(NoChange(answer(5), 0));
+  EXPECT_FALSE(t.take(q, 0).has_value());
+  q.push_picture(picture(1, true), answer(4), 0);
+  q.push_no_change(NoChange(answer(6), 0));
+  t.take(q, 0);
+  q.sent();
+  t.take(q, 0);
+  EXPECT_EQ(t.answers, (std::vector<CameraSequence>{5, 6}));
+}
+
+TEST(SendQueue, notices_a_client_that_does_not_read) {
+  SendLimits limits;
+  limits.grace = 1000;
+  SendQueue q{limits};
+  Taker t;
+  q.push_control(bytes(1));
+  t.take(q, 0);
+  EXPECT_FALSE(q.too_slow(1000));
+  EXPECT_TRUE(q.too_slow(1001));
+}
+
+// Whatever happens, what leaves the queue is a chain a decoder can follow: no picture follows a gap but a key frame.
+TEST(SendQueue, never_sends_a_picture_after_a_gap) {
+  std::mt19937 random(5);
+  for (int run = 0; run < 200; ++run) {
+    SendLimits limits;
+    limits.media_age = 30;
+    limits.media_bytes = 500;
+    SendQueue q{limits};
+    std::vector<std::pair<FrameNumber, bool>> out;
+    Microseconds now = 0;
+    bool busy = false;
+    bool want_key = false;
+    for (FrameNumber n = 1; n < 200; ++n) {
+      now += random() % 20;
+      const bool key = want_key || random() % 20 == 0;
+      want_key = false;
+      q.push_picture(picture(n, key, 50 + random() % 200), answer(0), now);
+      if (random() % 10 == 0) q.require_key();
+      if (random() % 30 == 0) q.push_bulk(bytes(1));
+      if (q.ask_for_key(now)) want_key = true;
+      if (busy && random() % 3 == 0) {
+        q.sent();
+        busy = false;
+      }
+      if (!busy) {
+        busy = q.take(
+                    now,
+                    [&](const auto& f, const ViewAnswer&) {
+                      out.emplace_back(f->frame, f->key);
+                      return bytes(1);
+                    },
+                    [](const NoChange&) { return bytes(1); })
+                   .has_value();
+      }
+    }
+    FrameNumber last = 0;
+    for (const auto& [number, key] : out) {
+      ASSERT_TRUE(key || number == last + 1) << "frame " << number << " after " << last;
+      last = number;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace darm::session

@@ -1,0 +1,275 @@
+#include "actors/session/session_protocol.hpp"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "proto/limits.hpp"
+#include "tests/unit/session/small_scene.hpp"
+
+namespace darm::session {
+namespace {
+
+constexpr Microseconds kSecond = 1'000'000;
+
+std::shared_ptr<const GeometryStream> scene() {
+  static const auto stream = [] {
+    const auto [s, l] = testing::grid(100);
+    return GeometryStream::build(s, l, 1.0f, 1).value();
+  }();
+  return stream;
+}
+
+class SessionProtocolTest : public ::testing::Test {
+ protected:
+  void start(SessionPolicy policy = {}) {
+    protocol = std::make_unique<SessionProtocol>(SessionId{3}, policy, std::string(32, 'k'), std::uint16_t{777},
+                                                 scene(), std::make_shared<FrameBodies>(), 0);
+  }
+  Actions say(const wire::Envelope& e, Microseconds now = 1) { return protocol->on_bytes(proto::frame(e), now); }
+  static wire::Envelope hello() {
+    wire::Envelope e;
+    e.mutable_hello()->set_version(1);
+    e.mutable_hello()->set_client("test");
+    e.mutable_hello()->set_max_phystex(2048);
+    return e;
+  }
+  static wire::Envelope camera(std::uint64_t sequence, float fovy = 0.8f) {
+    wire::Envelope e;
+    auto* c = e.mutable_camera();
+    c->set_sequence(sequence);
+    c->set_client_time_us(99);
+    put_pose(Camera{}, Viewport{}, *c->mutable_pose());
+    c->mutable_pose()->set_fovy(fovy);
+    return e;
+  }
+  /// Everything the session wants to send, as messages.
+  std::vector<wire::Envelope> heard(Microseconds now = 1) {
+    proto::FrameReader reader(proto::kMaxServerEnvelope);
+    std::vector<wire::Envelope> out;
+    while (auto packet = protocol->next_packet(now)) {
+      reader.feed(packet->head);
+      if (packet->body) reader.feed(*packet->body);
+      reader.feed(packet->tail);
+      (void)protocol->on_sent(now);
+    }
+    wire::Envelope e;
+    while (reader.next(e).value()) out.push_back(e);
+    return out;
+  }
+  template <class M>
+  static int count(const Actions& actions) {
+    int n = 0;
+    for (const auto& a : actions) n += std::holds_alternative<M>(a);
+    return n;
+  }
+  void expect_goodbye(wire::Goodbye::Reason reason) {
+    const auto out = heard();
+    ASSERT_FALSE(out.empty());
+    ASSERT_TRUE(out.back().has_goodbye());
+    EXPECT_EQ(out.back().goodbye().reason(), reason);
+    EXPECT_FALSE(out.back().goodbye().text().empty());
+    EXPECT_TRUE(protocol->finished(1));
+    EXPECT_FALSE(protocol->end().empty());
+  }
+
+  std::unique_ptr<SessionProtocol> protocol;
+};
+
+TEST_F(SessionProtocolTest, a_hello_is_answered_in_the_agreed_order) {
+  start();
+  const auto actions = say(hello());
+  EXPECT_EQ(count<tile_scheduler::SessionOpened>(actions), 1);
+  EXPECT_EQ(count<encoder::CoarseWanted>(actions), 1);
+  auto texture = std::make_shared<CoarseTexture>();
+  texture->version = 1;
+  texture->h264 = {1, 2, 3};
+  protocol->on_coarse(CoarseUpdated(texture));
+  const auto out = heard();
+  ASSERT_EQ(out.size(), 3 + scene()->chunk_count());
+  ASSERT_TRUE(out[0].has_welcome());
+  EXPECT_EQ(out[0].welcome().session(), 3u);
+  EXPECT_EQ(out[0].welcome().key().size(), 32u);
+  EXPECT_EQ(out[0].welcome().udp_port(), 777u);
+  EXPECT_EQ(out[0].welcome().phystex_size(), 2048u);
+  EXPECT_TRUE(out[1].has_manifest());
+  for (std::size_t i = 0; i < scene()->chunk_count(); ++i) EXPECT_TRUE(out[2 + i].has_geometry());
+  EXPECT_TRUE(out.back().has_coarse());
+}
+
+TEST_F(SessionProtocolTest, formats_are_what_both_sides_can_do) {
+  SessionPolicy policy;
+  policy.phystex_size = 2048;
+  const auto format = [&](std::uint32_t max, bool c444, bool lossless, bool allow) {
+    policy.allow_lossless = allow;
+    start(policy);
+    auto e = hello();
+    e.mutable_hello()->set_max_phystex(max);
+    e.mutable_hello()->set_chroma_444(c444);
+    e.mutable_hello()->set_lossless(lossless);
+    for (const auto& a : say(e)) {
+      if (const auto* o = std::get_if<tile_scheduler::SessionOpened>(&a)) return o->format;
+    }
+    tile_scheduler::StreamFormat none;
+    none.phystex_size = 0;
+    return none;
+  };
+  EXPECT_EQ(format(4096, false, false, false).phystex_size, 2048u);
+  EXPECT_EQ(format(1500, false, false, false).phystex_size, 1024u);
+  EXPECT_EQ(format(0, false, false, false).phystex_size, 2048u);
+  EXPECT_EQ(format(512, false, false, false).phystex_size, 0u);
+  EXPECT_TRUE(format(2048, true, false, false).chroma_444);
+  EXPECT_EQ(format(16384, false, true, false).phystex_size, 0u);
+  EXPECT_EQ(format(16384, false, true, true).phystex_size, 8192u);
+  EXPECT_TRUE(format(16384, false, true, true).lossless_rgb);
+}
+
+TEST_F(SessionProtocolTest, unknown_versions_are_refused_with_a_reason) {
+  start();
+  auto e = hello();
+  e.mutable_hello()->set_version(2);
+  EXPECT_EQ(count<tile_scheduler::SessionOpened>(say(e)), 0);
+  expect_goodbye(wire::Goodbye::VERSION_UNSUPPORTED);
+}
+
+TEST_F(SessionProtocolTest, the_first_message_must_be_hello) {
+  start();
+  (void)say(camera(1));
+  expect_goodbye(wire::Goodbye::PROTOCOL_ERROR);
+}
+
+TEST_F(SessionProtocolTest, a_silent_client_is_let_go) {
+  start();
+  (void)protocol->on_tick(4 * kSecond);
+  EXPECT_FALSE(protocol->next_packet(4 * kSecond).has_value());
+  (void)protocol->on_tick(6 * kSecond);
+  expect_goodbye(wire::Goodbye::TIMED_OUT);
+  start();
+  (void)say(hello());
+  (void)heard();
+  (void)protocol->on_tick(29 * kSecond);
+  EXPECT_TRUE(protocol->open());
+  wire::Envelope ping;
+  ping.mutable_ping()->set_time_us(5);
+  (void)say(ping, 29 * kSecond);
+  ASSERT_EQ(heard().size(), 1u);
+  (void)protocol->on_tick(58 * kSecond);
+  EXPECT_TRUE(protocol->open());
+  (void)protocol->on_tick(60 * kSecond);
+  expect_goodbye(wire::Goodbye::TIMED_OUT);
+}
+
+TEST_F(SessionProtocolTest, a_client_that_never_reads_is_too_slow) {
+  start();
+  (void)say(hello());
+  ASSERT_TRUE(protocol->next_packet(0).has_value());  // under way for ever
+  (void)protocol->on_tick(16 * kSecond);
+  EXPECT_NE(protocol->end().find("TOO_SLOW"), std::string::npos);
+  EXPECT_FALSE(protocol->finished(16 * kSecond));
+  EXPECT_TRUE(protocol->finished(19 * kSecond));  // the goodbye cannot leave: closed all the same
+}
+
+TEST_F(SessionProtocolTest, the_newest_camera_wins_over_tcp_and_udp) {
+  start();
+  (void)say(hello());
+  auto actions = say(camera(5), 77);
+  ASSERT_EQ(count<tile_scheduler::ViewChanged>(actions), 1);
+  const auto& view = std::get<tile_scheduler::ViewChanged>(actions[0]);
+  EXPECT_EQ(view.sequence, 5u);
+  EXPECT_EQ(view.stamps.client_sent, 99);
+  EXPECT_EQ(view.stamps.camera_received, 77);
+  wire::DatagramBody body;
+  *body.mutable_camera() = camera(4).camera();
+  EXPECT_EQ(count<tile_scheduler::ViewChanged>(protocol->on_datagram(body, 2)), 0);
+  *body.mutable_camera() = camera(6).camera();
+  EXPECT_EQ(count<tile_scheduler::ViewChanged>(protocol->on_datagram(body, 2)), 1);
+  EXPECT_EQ(count<tile_scheduler::ViewChanged>(say(camera(6))), 0);
+}
+
+TEST_F(SessionProtocolTest, poses_that_make_no_sense_are_refused_then_the_client) {
+  start();
+  (void)say(hello());
+  for (unsigned i = 0; i < 16; ++i) {
+    EXPECT_EQ(count<tile_scheduler::ViewChanged>(say(camera(i + 1, std::nanf("")))), 0);
+  }
+  EXPECT_TRUE(protocol->open());
+  EXPECT_EQ(count<tile_scheduler::ViewChanged>(say(camera(100))), 1);
+  (void)say(camera(101, -1.0f));
+  expect_goodbye(wire::Goodbye::PROTOCOL_ERROR);
+}
+
+TEST_F(SessionProtocolTest, a_long_message_ends_the_session) {
+  start();
+  const std::vector<std::uint8_t> huge{0x7f, 0xff, 0xff, 0xff};
+  (void)protocol->on_bytes(huge, 1);
+  expect_goodbye(wire::Goodbye::PROTOCOL_ERROR);
+}
+
+TEST_F(SessionProtocolTest, frames_carry_picture_table_answer_and_stamps) {
+  start();
+  (void)say(hello());
+  (void)heard();
+  auto frame = std::make_shared<EncodedFrame>();
+  frame->frame = 12;
+  frame->key = true;
+  frame->h264 = {9, 8, 7};
+  frame->error = 0.5f;
+  auto coverage = std::make_shared<CoverageTile>();
+  coverage->fill(200);
+  frame->edits.push_back({TileId(2, 34), 56, coverage});
+  ViewAnswer answer;
+  answer.sequence = 4;
+  answer.stamps.camera_received = 11;
+  answer.stamps.encoded = 22;
+  (void)protocol->on_frame(FrameEncoded(frame, answer), 30);
+  const auto out = heard(33);
+  ASSERT_EQ(out.size(), 1u);
+  const auto& f = out[0].frame();
+  EXPECT_EQ(f.frame(), 12u);
+  EXPECT_TRUE(f.key());
+  EXPECT_EQ(f.h264(), std::string("\x09\x08\x07"));
+  EXPECT_EQ(f.answers(), 4u);
+  EXPECT_FLOAT_EQ(f.error(), 0.5f);
+  EXPECT_EQ(f.stamps().camera_received(), 11);
+  EXPECT_EQ(f.stamps().encoded(), 22);
+  EXPECT_EQ(f.stamps().sent(), 33);
+  ASSERT_EQ(f.page_edits_size(), 1);
+  EXPECT_EQ(f.page_edits(0).slot(), 56u);
+  CoverageTile back;
+  uLongf size = back.size();
+  const auto& packed = f.page_edits(0).coverage();
+  ASSERT_EQ(uncompress(back.data(), &size, reinterpret_cast<const Bytef*>(packed.data()), packed.size()), Z_OK);
+  EXPECT_EQ(back, *coverage);
+}
+
+TEST_F(SessionProtocolTest, lost_frames_are_answered_with_a_key_frame) {
+  start();
+  (void)say(hello());
+  (void)heard();
+  auto frame = std::make_shared<EncodedFrame>();
+  frame->frame = 2;
+  EXPECT_EQ(count<tile_scheduler::KeyFrameWanted>(protocol->on_frame(FrameEncoded(frame, {}), 1)), 1);
+  wire::Envelope feedback;
+  feedback.mutable_feedback()->set_key_frame_wanted(true);
+  EXPECT_EQ(count<tile_scheduler::KeyFrameWanted>(say(feedback)), 1);
+  EXPECT_TRUE(heard().empty());
+}
+
+TEST_F(SessionProtocolTest, a_goodbye_ends_it_without_an_answer) {
+  start();
+  (void)say(hello());
+  wire::Envelope bye;
+  bye.mutable_goodbye()->set_reason(wire::Goodbye::CLIENT_LEAVES);
+  (void)say(bye);
+  EXPECT_TRUE(protocol->finished(1));
+  EXPECT_TRUE(heard().empty());
+}
+
+TEST(FrameBodies, sessions_of_a_stream_share_the_bytes) {
+  FrameBodies bodies;
+  const auto frame = std::make_shared<EncodedFrame>();
+  EXPECT_EQ(bodies.body_of(frame), bodies.body_of(frame));
+  EXPECT_NE(bodies.body_of(frame), bodies.body_of(std::make_shared<EncodedFrame>()));
+}
+
+}  // namespace
+}  // namespace darm::session
