@@ -231,10 +231,10 @@ void GlesRenderer::State::draw_background(const SceneModel& scene, const View& v
   glUniform4f(program.at("u_sun"), b.sun_direction.x, b.sun_direction.y, b.sun_direction.z,
               b.has_sun ? b.sun_cos : 2.0f);
   glUniform3fv(program.at("u_sun_rgb"), 1, glm::value_ptr(b.sun_rgb));
-  glDisable(GL_DEPTH_TEST);
+  glUniform1f(program.at("u_depth"), clip_control != nullptr ? 0.0f : 1.0f);
+  glDisable(GL_CULL_FACE);
   glBindVertexArray(empty_array.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  glEnable(GL_DEPTH_TEST);
 }
 
 Result<void> GlesRenderer::State::draw_items(const SceneModel& scene, const View& view, const std::vector<Item>& items,
@@ -292,7 +292,6 @@ Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glClearDepthf(reversed ? 0.0f : 1.0f);
   glClear(GL_DEPTH_BUFFER_BIT);
-  draw_background(scene, view, stats_pass);
   textures.bind();
   const auto eye = glm::vec3(view.position - scene.origin());
   for (auto* items : {&opaque, &blended}) {
@@ -302,6 +301,7 @@ Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View
   std::stable_sort(opaque.begin(), opaque.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
   std::stable_sort(blended.begin(), blended.end(),
                    [](const Item& a, const Item& b) { return a.distance > b.distance; });
+  glEnable(GL_DEPTH_TEST);
   glDepthFunc(reversed ? GL_GEQUAL : GL_LEQUAL);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   Result<void> ok = draw_items(scene, view, opaque, Pass::kDepth, false);
@@ -309,6 +309,7 @@ Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View
   const Pass pass = stats_pass ? Pass::kStats : Pass::kColour;
   if (ok) ok = draw_items(scene, view, opaque, pass, false);
   glDepthMask(GL_FALSE);
+  draw_background(scene, view, stats_pass);  // at the far plane: only where nothing opaque is
   if (!stats_pass) glEnable(GL_BLEND);
   if (ok) ok = draw_items(scene, view, blended, pass, true);
   glDisable(GL_BLEND);
