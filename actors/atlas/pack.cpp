@@ -65,8 +65,11 @@ std::int32_t round_up(std::int32_t v, std::int32_t step) { return (v + step - 1)
 
 /// Class of shapes that fit and fail alike: where one found no hole, the next need not look again.
 std::uint32_t class_of(const Footprint& f) {
+  // Finer steps for large shapes: they are few, and a missed hole costs more.
   const auto step = [](std::int32_t v) {
-    return static_cast<std::uint32_t>(v <= 8 ? v : 8 + static_cast<int>(std::log2(static_cast<float>(v) / 8.0f) * 4));
+    const float octaves = std::log2(static_cast<float>(v));
+    if (v <= 6) return static_cast<std::uint32_t>(v);
+    return static_cast<std::uint32_t>(v <= 64 ? 1 + octaves * 2 : octaves * 4 - 11);
   };
   const auto full = static_cast<double>(f.texels) / (static_cast<double>(f.width) * f.height);
   return step(f.width) << 16 | step(f.height) << 8 | static_cast<std::uint32_t>(full * 3.999);

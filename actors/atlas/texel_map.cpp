@@ -21,16 +21,16 @@ class TileTexelsBuilder {
     const auto& place = level_.placements[index_of(patch)];
     const glm::ivec2 offset(static_cast<int>(place.x) - left_, static_cast<int>(place.y) - top_);
     if (place.scale == 0) return add_single(chart, triangles, instance, front, patch, offset);
-    const glm::vec2 shift = glm::vec2(offset) + 0.5f;
     const float scale = place.scale * level_.density;
-    constexpr auto side = static_cast<float>(kTileSize);
+    // The tile's texels in the patch's own coordinates, where texel k has its centre at k.
+    const glm::vec2 low(-offset), high(glm::ivec2(kTileSize) - offset);
     for (const auto t : triangles) {
       const auto& uv = chart.uv[t];
-      const std::array<glm::vec2, 3> c{shift + uv[0] * scale, shift + uv[1] * scale, shift + uv[2] * scale};
-      if (std::min({c[0].x, c[1].x, c[2].x}) > side + 1 || std::max({c[0].x, c[1].x, c[2].x}) < -1 ||
-          std::min({c[0].y, c[1].y, c[2].y}) > side + 1 || std::max({c[0].y, c[1].y, c[2].y}) < -1)
+      const std::array<glm::vec2, 3> c{uv[0] * scale, uv[1] * scale, uv[2] * scale};
+      if (std::min({c[0].x, c[1].x, c[2].x}) > high.x + 1 || std::max({c[0].x, c[1].x, c[2].x}) < low.x - 2 ||
+          std::min({c[0].y, c[1].y, c[2].y}) > high.y + 1 || std::max({c[0].y, c[1].y, c[2].y}) < low.y - 2)
         continue;
-      add_triangle(c, {instance, t, front}, patch);
+      add_triangle(c, offset, {instance, t, front}, patch);
     }
   }
 
@@ -62,33 +62,36 @@ class TileTexelsBuilder {
     std::uint32_t fragment;
   };
 
-  void add_triangle(const std::array<glm::vec2, 3>& c, const TexelFragment& f, PatchId patch) {
+  /// The same arithmetic as footprint_of, in the patch's own coordinates: a texel is claimed here if and only if the
+  /// packer kept it for the patch.
+  void add_triangle(const std::array<glm::vec2, 3>& c, glm::ivec2 offset, const TexelFragment& f, PatchId patch) {
     constexpr float reach = 1.0f + kFootprintMargin;
     const auto fragment = static_cast<std::uint32_t>(out_->fragments_.size());
     const std::size_t before = near_.size();
     const float low = std::min({c[0].y, c[1].y, c[2].y});
     const float high = std::max({c[0].y, c[1].y, c[2].y});
-    const int first = std::max(0, static_cast<int>(std::floor(low - 0.5f - reach)) + 1);
-    const int last = std::min(kTileSize - 1, static_cast<int>(std::ceil(high - 0.5f + reach)) - 1);
-    for (int y = first; y <= last; ++y) {
-      const auto row = static_cast<float>(y);
+    const int first = std::max({0, -offset.y, static_cast<int>(std::floor(low - reach)) + 1});
+    const int last = std::min(kTileSize - 1 - offset.y, static_cast<int>(std::ceil(high + reach)) - 1);
+    for (int k = first; k <= last; ++k) {
+      const auto row = static_cast<float>(k);
       float lo = 0, hi = 0;
-      if (!extent_in_slab(c, row + 0.5f - reach, row + 0.5f + reach, lo, hi)) continue;
+      if (!extent_in_slab(c, row - reach, row + reach, lo, hi)) continue;
       float inner_lo = 1, inner_hi = 0;
-      const bool inner = extent_in_slab(c, row, row + 1, inner_lo, inner_hi);
-      const int x0 = std::max(0, static_cast<int>(std::floor(lo - 0.5f - reach)) + 1);
-      const int x1 = std::min(kTileSize - 1, static_cast<int>(std::ceil(hi - 0.5f + reach)) - 1);
-      for (int x = x0; x <= x1; ++x) {
-        const auto texel = static_cast<std::uint16_t>(y * kTileSize + x);
-        const auto column = static_cast<float>(x);
-        const bool overlaps = inner && inner_hi >= column && inner_lo <= column + 1;
+      const bool inner = extent_in_slab(c, row - 0.5f, row + 0.5f, inner_lo, inner_hi);
+      const int own_first = std::max(0, static_cast<int>(std::floor(lo - reach)) + 1);
+      const int own_last = std::max(static_cast<int>(std::ceil(hi + reach)) - 1, own_first);
+      for (int j = std::max(own_first, -offset.x); j <= std::min(own_last, kTileSize - 1 - offset.x); ++j) {
+        const auto texel = static_cast<std::uint16_t>((k + offset.y) * kTileSize + j + offset.x);
+        const auto column = static_cast<float>(j);
+        const bool overlaps = inner && inner_hi >= column - 0.5f && inner_lo <= column + 0.5f;
         out_->patches_[texel] = patch;
         near_.push_back({texel, overlaps, fragment});
       }
     }
     if (near_.size() == before) return;
+    const glm::vec2 shift = glm::vec2(offset) + 0.5f;
     out_->fragments_.push_back(f);
-    out_->corners_.push_back(c);
+    out_->corners_.push_back({c[0] + shift, c[1] + shift, c[2] + shift});
   }
 
   /// A patch of one texel: every triangle is a candidate, chosen by area.
