@@ -156,7 +156,7 @@ void apply(std::string_view toml, const std::filesystem::path& file, Config& con
     return;
   }
   ReadReport report{file.string(), &faults, nullptr};
-  read_root(report, std::get_if<TomlTable>(&parsed->data), file, config);
+  read_root(report, parsed->table(), file, config);
 }
 
 std::expected<std::string, std::string> read_file(const std::filesystem::path& file) {

@@ -145,7 +145,7 @@ void TableReader::one_of(std::string_view key, std::uint32_t& out, std::initiali
 }
 
 bool TableReader::read_vector(const TomlValue& value, std::string_view key, double low, double high, glm::dvec3& out) {
-  const auto* array = std::get_if<TomlArray>(&value.data);
+  const auto* array = value.array();
   if (array == nullptr || array->size() != 3) {
     fault_at(value, key, fmt::format("{} is not a list of three numbers from {} to {}", value.shown(), low, high));
     return false;
@@ -164,7 +164,7 @@ void TableReader::vector3(std::string_view key, glm::dvec3& out, double low, dou
 void TableReader::rgb(std::string_view key, glm::dvec3& out, double low, double high) {
   const TomlValue* value = ask(key);
   if (value == nullptr) return;
-  if (std::holds_alternative<TomlArray>(value->data)) {
+  if (value->array() != nullptr) {
     (void)read_vector(*value, key, low, high, out);
     return;
   }
@@ -184,7 +184,7 @@ void TableReader::direction(std::string_view key, glm::dvec3& out) {
 
 bool TableReader::table(std::string_view key, const std::function<void(TableReader&)>& read) {
   const TomlValue* value = ask_section(key);
-  const TomlTable* table = value != nullptr ? std::get_if<TomlTable>(&value->data) : nullptr;
+  const TomlTable* table = value != nullptr ? value->table() : nullptr;
   if (value != nullptr && table == nullptr)
     fault_at(*value, key, fmt::format("{} is not a section; write [{}{}]", value->shown(), prefix_, key));
   if (table == nullptr && report_.known == nullptr) return false;
@@ -203,7 +203,7 @@ void TableReader::tables(std::string_view key, std::size_t most, const std::func
     inner.finish();
   }
   if (value == nullptr) return;
-  const auto* array = std::get_if<TomlArray>(&value->data);
+  const auto* array = value->array();
   if (array == nullptr || array->size() > most) {
     fault_at(*value, key,
              fmt::format("{} is not a list of at most {} sections [[{}{}]]", value->shown(), most, prefix_, key));
@@ -212,7 +212,7 @@ void TableReader::tables(std::string_view key, std::size_t most, const std::func
   begin();
   for (std::size_t i = 0; i < array->size(); ++i) {
     const auto& element = (*array)[i];
-    const auto* table = std::get_if<TomlTable>(&element.data);
+    const auto* table = element.table();
     if (table == nullptr) {
       fault_at(element, key, fmt::format("{} is not a section [[{}{}]]", element.shown(), prefix_, key));
       continue;

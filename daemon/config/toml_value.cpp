@@ -22,7 +22,7 @@ TomlValue convert(const toml::node& node) {
       TomlArray array;
       array.reserve(concrete.size());
       for (const auto& element : concrete) array.push_back(convert(element));
-      value.data = std::move(array);
+      value.data = std::make_shared<const TomlArray>(std::move(array));
     } else if constexpr (toml::is_table<decltype(concrete)>) {
       TomlTable table;
       for (const auto& [key, element] : concrete) {
@@ -31,7 +31,7 @@ TomlValue convert(const toml::node& node) {
         if (key.source().begin.line != 0 && !element.is_table())
           table.back().second.line = static_cast<int>(key.source().begin.line);
       }
-      value.data = std::move(table);
+      value.data = std::make_shared<const TomlTable>(std::move(table));
     }
   });
   return value;
@@ -39,12 +39,22 @@ TomlValue convert(const toml::node& node) {
 
 }  // namespace
 
+const TomlArray* TomlValue::array() const {
+  const auto* held = std::get_if<std::shared_ptr<const TomlArray>>(&data);
+  return held != nullptr ? held->get() : nullptr;
+}
+
+const TomlTable* TomlValue::table() const {
+  const auto* held = std::get_if<std::shared_ptr<const TomlTable>>(&data);
+  return held != nullptr ? held->get() : nullptr;
+}
+
 std::string TomlValue::shown() const {
   if (const auto* b = std::get_if<bool>(&data)) return *b ? "true" : "false";
   if (const auto* i = std::get_if<std::int64_t>(&data)) return fmt::format("{}", *i);
   if (const auto* d = std::get_if<double>(&data)) return fmt::format("{}", *d);
-  if (std::holds_alternative<TomlArray>(data)) return "a list";
-  if (std::holds_alternative<TomlTable>(data)) return "a table";
+  if (array() != nullptr) return "a list";
+  if (table() != nullptr) return "a table";
   const auto* s = std::get_if<std::string>(&data);
   if (s == nullptr) return "a date or time";
   std::string text = s->substr(0, 60);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <expected>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,8 +18,13 @@ using TomlTable = std::vector<std::pair<std::string, TomlValue>>;
 
 /// A value and the line it stands on. std::monostate: a date or a time, which no key of ours takes.
 struct TomlValue {
-  std::variant<std::monostate, bool, std::int64_t, double, std::string, TomlArray, TomlTable> data;
+  std::variant<std::monostate, bool, std::int64_t, double, std::string, std::shared_ptr<const TomlArray>,
+               std::shared_ptr<const TomlTable>>
+      data;
   int line = 0;
+  /// Null if the value is something else.
+  [[nodiscard]] const TomlArray* array() const;
+  [[nodiscard]] const TomlTable* table() const;
   /// As it reads in a message: 3, "text", [array], {table}; long texts are cut, control characters masked.
   [[nodiscard]] std::string shown() const;
 };
