@@ -78,7 +78,9 @@ glm::vec3 Bsdf::evaluate_reflection(const glm::vec3& wi, const glm::vec3& li, fl
   const glm::vec3 h = glm::normalize(wo_ + li);
   const float cos_half = glm::clamp(glm::dot(wo_, h), 0.0f, 1.0f);
   if (diffuse_probability_ > 0 && cos_diffuse > 0) {
-    const float share = (1.0f - material_.metallic) * (1.0f - material_.transmission) * (1.0f - fresnel(cos_half));
+    // 1 - F(n.v), not F(v.h) as in appendix B: with v.h a smooth plastic returns up to 1.4 times the light at grazing
+    // angles. The view average is then exactly MaterialPoint::diffuse_albedo.
+    const float share = (1.0f - material_.metallic) * (1.0f - material_.transmission) * (1.0f - fresnel(wo_.z));
     f += material_.base * (share * cos_diffuse * kInversePi);
     pdf += diffuse_probability_ * cos_diffuse * kInversePi;
   }

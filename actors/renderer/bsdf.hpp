@@ -16,10 +16,10 @@ struct BsdfSample {
   float pdf = 0;
 };
 
-/// Lobes: Lambert under a Schlick-weighted GGX coat (VNDF sampled, height-correlated Smith), metal GGX, and
-/// transmission: thin walls scatter to the mirrored side, volumes refract (Walter et al., Microfacet Models for
-/// Refraction, 2007). Straight passage (MaterialPoint::straight_through) is not a lobe: the path walks through before
-/// it gets here. Directions point away from the surface; unit length.
+/// Lobes: Lambert, weighted by 1 - F(n.v), under a Schlick-weighted GGX coat (VNDF sampled, height-correlated Smith),
+/// metal GGX, and transmission: thin walls scatter to the mirrored side, volumes refract (Walter et al., Microfacet
+/// Models for Refraction, 2007). Straight passage (MaterialPoint::straight_through) is not a lobe: the path walks
+/// through before it gets here. Directions point away from the surface; unit length.
 class Bsdf {
  public:
   /// `wo`: towards where the path came from, on the side of surface.geometric_normal.

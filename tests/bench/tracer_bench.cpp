@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <string>
 #include <vector>
 
@@ -134,12 +135,16 @@ int main(int argc, char** argv) {
     job.effects = effects;
     job.spp = spp;
     job.threads = threads;
+    const std::clock_t cpu = std::clock();
     const auto picture = render_reference(transport, job);
+    const double cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
     if (!picture) return std::fprintf(stderr, "%s\n", picture.error().message.c_str()), 1;
     const bool full = effects == PictureEffects::kFull;
-    std::printf("%s: %.3f M paths/s on %u threads (Cycles 3.4 on Sponza: 0.33), own PSNR %.1f dB at %u spp\n",
-                full ? "full" : "view-independent", static_cast<double>(picture->paths) / picture->seconds / 1e6,
-                threads, picture->own_psnr, picture->spp);
+    std::printf(
+        "%s: %.3f M paths/s on %u threads, %.3f M per CPU second (Cycles 3.4 on Sponza: 0.33), own PSNR %.1f dB at %u "
+        "spp\n",
+        full ? "full" : "view-independent", static_cast<double>(picture->paths) / picture->seconds / 1e6, threads,
+        static_cast<double>(picture->paths) / cpu_seconds / 1e6, picture->own_psnr, picture->spp);
     if (const char* out = std::getenv("TRACER_BENCH_PNG")) {
       if (auto ok = write_png(std::string(out) + (full ? ".full.png" : ".vi.png"), picture->mean); !ok)
         std::fprintf(stderr, "%s\n", ok.error().message.c_str());
