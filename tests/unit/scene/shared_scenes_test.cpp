@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <numeric>
 
+#include "actors/scene/effect_plan.hpp"
 #include "actors/scene/gltf_loader.hpp"
+#include "actors/scene/primitive_data.hpp"
 
 namespace darm::scene {
 namespace {
@@ -106,6 +108,46 @@ INSTANTIATE_TEST_SUITE_P(
         Broken{"invalid_magic.glb", "magic"}, Broken{"version_unsupported.gltf", "'3.0'"},
         Broken{"required_extension_unsupported.gltf", "EXT_lights_image_based"}, Broken{"no_scene.gltf", "no scenes"},
         Broken{"image_invalid_data/invalid_image_data.gltf", "image 0"}));
+
+TEST(SharedScenes, GeneratedTangentsAgreeWithThoseOfTheFile) {
+  const auto path = kScenes / "features/lights_punctual_lamp.glb";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "shared scenes are not here";
+  const auto scene = load_scene(path, {});
+  ASSERT_TRUE(scene);
+  std::size_t vertices = 0;
+  std::size_t agree = 0;
+  for (const Mesh& m : (*scene)->meshes) {
+    if (m.tangents.empty()) continue;
+    std::map<std::string, std::uint64_t> dropped;
+    const Mesh made = make_mesh({m.positions, m.normals, {}, m.uvs, {}, m.triangles}, 0, dropped);
+    ASSERT_EQ(made.triangles.size(), m.triangles.size());
+    for (std::size_t t = 0; t < m.triangles.size(); ++t) {
+      const glm::vec4 theirs = m.tangents[m.triangles[t].x];
+      const glm::vec4 ours = made.tangents[made.triangles[t].x];
+      ++vertices;
+      agree += glm::dot(glm::vec3(theirs), glm::vec3(ours)) > 0.8f && theirs.w == ours.w;
+    }
+  }
+  EXPECT_EQ(vertices, 6000u);
+  EXPECT_GT(static_cast<double>(agree), 0.99 * static_cast<double>(vertices));
+}
+
+TEST(DefaultScene, HasWhatItIsMadeToShowAndNoWarnings) {
+  const std::filesystem::path path = std::filesystem::path(DARM_SOURCE_DIR) / "config/scenes/default.glb";
+  ASSERT_TRUE(std::filesystem::exists(path));
+  EXPECT_LT(std::filesystem::file_size(path), 2u << 20);
+  const auto loaded = load_scene(path, {});
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  const Scene& scene = **loaded;
+  EXPECT_TRUE(scene.warnings.empty());
+  EXPECT_TRUE(scene.dropped.empty());
+  EXPECT_GT(scene.triangle_count(), 10000u);
+  EXPECT_EQ(scene.cameras.size(), 4u);
+  EXPECT_EQ(scene.lights.size(), 3u);
+  const EffectPlan plan = plan_effects(scene);
+  EXPECT_TRUE(plan.delta_lights && plan.area_lights && plan.alpha_test && plan.transmission && plan.volume_attenuation);
+  EXPECT_TRUE(plan.normal_maps && plan.textures && plan.moving_bodies && plan.moving_lights && plan.glossy_reflection);
+}
 
 TEST(SharedScenes, DracoGivesTheSameSceneAsPlain) {
   const auto plain = kScenes / "scenes/chess_board.glb";
