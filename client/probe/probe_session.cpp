@@ -240,7 +240,6 @@ Result<void> Run::step() {
     message = connection_->next(milliseconds(0));
     if (!message) return std::unexpected(message.error());
   }
-  if (message->has_value()) return {};
   return draw_if_due();
 }
 
