@@ -165,8 +165,9 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
   }
   const LevelTiles level = shared.level_of(job.tile);
   const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces);
-  if (facts && result.shading.progress.mean > 0 && result.shading.progress.least < kCountWithoutFilter)
-    facts->learn_albedo(*surface, job.mask);
+  const float least = result.shading.progress.least;
+  if (facts && result.shading.progress.mean > 0 && least < kCountWithoutFilter)
+    facts->learn_albedo(*surface, job.mask, least < 2 ? 1 : least < 8 ? 4 : 8);
 }
 
 void RendererActor::learn_cost(double seconds, std::uint64_t samples) {

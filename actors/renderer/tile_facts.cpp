@@ -8,23 +8,20 @@
 
 namespace darm::renderer {
 
-void TileFacts::learn_albedo(const TileSurface& surface, const TexelMask& wanted, int points) {
+void TileFacts::learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points) {
+  const int goal = std::min(wanted_points, 255);
   for (int texel = 0; texel < kTileTexels; ++texel) {
-    if (!wanted.test(texel) || known.test(texel)) continue;
-    glm::vec3 sum(0.0f);
-    int found = 0;
-    for (int i = 0; i < points; ++i)
-      if (const auto a = surface.albedo(texel, static_cast<std::uint32_t>(i))) {
-        sum += *a;
-        ++found;
-      }
-    const glm::vec3 mean = found > 0 ? sum / static_cast<float>(found) : glm::vec3(0.0f);
+    const auto at = static_cast<std::size_t>(texel);
+    if (!wanted.test(texel) || points[at] >= goal) continue;
+    glm::vec3 sum = albedo(texel) * static_cast<float>(points[at]);
+    for (int i = points[at]; i < goal; ++i)
+      if (const auto a = surface.albedo(texel, static_cast<std::uint32_t>(i))) sum += *a;
+    const glm::vec3 mean = sum / static_cast<float>(goal);
     for (int c = 0; c < 3; ++c) {
       const float a = mean[c] > 0.0f ? std::min(mean[c], 1.0f) : 0.0f;  // NaN becomes 0: not filtered
-      albedo_bits[static_cast<std::size_t>(texel)][static_cast<std::size_t>(c)] =
-          static_cast<std::uint16_t>(std::lround(a * 65535.0f));
+      albedo_bits[at][static_cast<std::size_t>(c)] = static_cast<std::uint16_t>(std::lround(a * 65535.0f));
     }
-    known.set(texel % kTileSize, texel / kTileSize);
+    points[at] = static_cast<std::uint8_t>(goal);
   }
 }
 

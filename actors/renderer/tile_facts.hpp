@@ -15,19 +15,20 @@
 
 namespace darm::renderer {
 
-/// About 9 KB a tile. Albedo is averaged over a few points of each texel, only where somebody has shaded.
+/// About 10 KB a tile. Albedo is averaged over a few points of each texel, only where somebody has shaded.
 struct TileFacts {
   std::array<std::uint32_t, kTileTexels> patch{};
   std::array<std::array<std::uint16_t, 3>, kTileTexels> albedo_bits{};  ///< 65535 is 1
-  TexelMask known;                                                      ///< texels whose albedo is there
+  std::array<std::uint8_t, kTileTexels> points{};                       ///< of each texel's albedo mean; 0: not known
   std::shared_ptr<const CoverageTile> coverage;                         ///< null: opaque
 
   [[nodiscard]] glm::vec3 albedo(int texel) const {
     const auto& a = albedo_bits[static_cast<std::size_t>(texel)];
     return glm::vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f);
   }
-  /// Averages `points` albedo samples over each texel of `wanted` that is not known yet.
-  void learn_albedo(const TileSurface& surface, const TexelMask& wanted, int points = 4);
+  /// Brings the albedo of each texel of `wanted` to a mean of `wanted_points` points: few at first, so that the first
+  /// picture comes soon, more when light is exact enough to show the difference.
+  void learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points = 4);
 };
 
 /// Mean alpha of the slot's 32x32 texels, border from the neighbour tiles; null if all of it is opaque.
