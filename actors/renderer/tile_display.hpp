@@ -19,8 +19,8 @@ struct DisplayOptions {
 
 struct TilePicture {
   std::shared_ptr<const TileImage> image;
-  float error = 0;  ///< RMS over the mask's texels of the display-space standard error, 0..1. Noise only: what the
-                    ///< filter smears is not in it
+  float error = 0;    ///< RMS over the mask's texels of the display-space standard error, 0..1. Noise only: what the
+                      ///< filter smears is not in it
   float samples = 0;  ///< mean samples per texel of the mask
 };
 
