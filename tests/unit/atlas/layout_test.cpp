@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <map>
 
 #include "actors/atlas/build_layout.hpp"
 #include "actors/atlas/footprint.hpp"
 #include "actors/atlas/layout_cache.hpp"
+#include "actors/scene/gltf_loader.hpp"
 #include "tests/unit/atlas/hand_made_scenes.hpp"
 
 namespace darm::atlas {
@@ -205,6 +207,25 @@ TEST(Layout, ASceneWithoutSurfaceIsAnError) {
   EXPECT_FALSE(build_layout(scene_of({box({0, 0, 0}, {1, 1, 1})}), {.q = -1}).has_value());
   EXPECT_FALSE(build_layout(scene_of({box({0, 0, 0}, {1, 1, 1})}), {.q = std::nanf("")}).has_value());
 }
+
+class RealScene : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(RealScene, NoTexelIsClaimedTwiceAndNoTriangleFlips) {
+  const auto file = std::filesystem::path(DARM_SHARED_SCENES) / "scenes" / GetParam();
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
+  const auto loaded = scene::load_scene(file, {});
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().message;
+  const auto l = built(**loaded, 8, 2);
+  ASSERT_TRUE(l);
+  expect_no_texel_claimed_twice(*l);
+  for (const auto& chart : l->charts)
+    for (std::size_t t = 0; t < chart.uv.size(); ++t)
+      if (chart.local_patch[t] != kDroppedTriangle) {
+        EXPECT_GT(twice_area(chart.uv[t]), -1e-6);
+      }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, RealScene, ::testing::Values("sponza.glb", "sibenik.glb", "quake_oacmpdm10.glb"));
 
 }  // namespace
 }  // namespace darm::atlas
