@@ -1,0 +1,14 @@
+// darmd: loads a glTF scene, path-traces light into its texture atlas, and streams what clients see.
+#include <cstdio>
+#include <exception>
+#include <variant>
+
+#include "daemon/commands.hpp"
+
+int main(int argc, char** argv) try {
+  const auto command = darm::parse_command_line(argc, argv);
+  return std::visit([](const auto& what) { return darm::run(what); }, command);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "darmd: %s\n", error.what());
+  return 1;
+}

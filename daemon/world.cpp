@@ -1,0 +1,102 @@
+#include "daemon/world.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <system_error>
+#include <thread>
+
+#include "actors/atlas/build_layout.hpp"
+#include "actors/renderer/exposure.hpp"
+#include "daemon/scene_setup.hpp"
+
+namespace darm {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+atlas::LayoutOptions layout_options(const config::Config& config, unsigned threads) {
+  atlas::LayoutOptions options;
+  options.q = static_cast<float>(config.scene.q);
+  options.max_texels = config.atlas.max_texels;
+  options.threads = threads;
+  options.progress = [last = std::string(), tenth = -1](std::string_view stage, float fraction) mutable {
+    const int now = static_cast<int>(fraction * 10);
+    if (stage == last && now == tenth) return;
+    last = stage;
+    tenth = now;
+    spdlog::info("atlas: {} {} %", stage, now * 10);
+  };
+  return options;
+}
+
+Result<void> make_state_dir(const std::filesystem::path& dir) {
+  std::error_code error;
+  std::filesystem::create_directories(dir, error);
+  if (error) return fail(dir.string() + ": the state directory cannot be made: " + error.message());
+  return {};
+}
+
+/// What the stored light depends on beside scene and layout: the sample sequences and what a sample means.
+constexpr std::uint64_t kLightVersion = 1;
+
+}  // namespace
+
+unsigned thread_count(const config::Config& config) {
+  return config.render.threads != 0 ? config.render.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+Result<World> build_world(const config::Config& config, unsigned threads) {
+  World world;
+  if (auto made = make_state_dir(config.state.dir); !made) return std::unexpected(made.error());
+
+  auto start = Clock::now();
+  auto scene = load_configured_scene(config);
+  if (!scene) return std::unexpected(scene.error());
+  world.scene = std::move(*scene);
+  for (const auto& warning : world.scene->warnings) spdlog::warn("{}: {}", world.scene->path, warning);
+  spdlog::info("scene: {} triangles, {} materials, {} images, {} lights in {:.2f} s", world.scene->triangle_count(),
+               world.scene->materials.size(), world.scene->images.size(), world.scene->lights.size(),
+               seconds_since(start));
+
+  // The rays do not need the layout, so they are built beside it.
+  start = Clock::now();
+  auto building = std::async(std::launch::async, [&] { return renderer::trace::RayScene::build(world.scene, 1); });
+  atlas::LayoutTimes times;
+  auto layout = atlas::cached_layout(*world.scene, layout_options(config, threads), config.state.dir, &times);
+  auto rays = building.get();
+  if (!layout) return std::unexpected(layout.error());
+  if (!rays) return std::unexpected(rays.error());
+  world.layout = std::move(*layout);
+  world.rays = std::move(*rays);
+  const auto& finest = world.layout->levels.front();
+  spdlog::info("atlas: {} patches, q {}, {} levels, {} x {} texels, occupancy {:.2f} ({} in {:.2f} s)",
+               world.layout->patch_count, world.layout->q, world.layout->levels.size(), finest.width, finest.height,
+               finest.occupancy, times.pack > 0 ? "packed" : "from the cache", seconds_since(start));
+
+  world.transport = std::make_shared<renderer::LightTransport>(world.scene, world.rays);
+  world.exposure = config.scene.exposure > 0 ? static_cast<float>(config.scene.exposure)
+                                             : renderer::scene_exposure(*world.transport);
+  world.mapper = std::make_shared<atlas::TexelMapper>(world.scene, world.layout);
+
+  start = Clock::now();
+  auto geometry = session::GeometryStream::build(*world.scene, *world.layout, world.exposure, threads);
+  if (!geometry) return std::unexpected(geometry.error());
+  world.geometry = std::move(*geometry);
+  spdlog::info("geometry: {} chunks, {:.2f} MB in {:.2f} s, exposure {:.4g}", world.geometry->chunk_count(),
+               static_cast<double>(world.geometry->total_bytes()) * 1e-6, seconds_since(start), world.exposure);
+
+  auto store = atlas::RadianceStore::open(config.state.dir, {world.scene->hash, world.layout->hash, kLightVersion},
+                                          *world.layout, {config.state.max_store_bytes});
+  if (!store) return std::unexpected(store.error());
+  world.store = std::move(*store);
+  if (!world.store->refused_reason().empty()) spdlog::warn("radiance store: {}", world.store->refused_reason());
+  spdlog::info("radiance store: {} tiles in {}", world.store->counters().tiles, world.store->path().string());
+  return world;
+}
+
+}  // namespace darm
