@@ -13,6 +13,7 @@
 #include <glm/vec4.hpp>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "client/core/gles_resources.hpp"
@@ -298,9 +299,12 @@ Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View
     for (Item& item : *items)
       item.distance = glm::length(centre(scene.chunks()[item.chunk], scene.instances()[item.instance]) - eye);
   }
-  std::stable_sort(opaque.begin(), opaque.end(), [](const Item& a, const Item& b) { return a.distance < b.distance; });
-  std::stable_sort(blended.begin(), blended.end(),
-                   [](const Item& a, const Item& b) { return a.distance > b.distance; });
+  std::sort(opaque.begin(), opaque.end(), [](const Item& a, const Item& b) {
+    return std::tie(a.distance, a.instance, a.chunk) < std::tie(b.distance, b.instance, b.chunk);
+  });
+  std::sort(blended.begin(), blended.end(), [](const Item& a, const Item& b) {
+    return std::tie(a.distance, a.instance, a.chunk) > std::tie(b.distance, b.instance, b.chunk);
+  });
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(reversed ? GL_GEQUAL : GL_LEQUAL);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
