@@ -1,5 +1,5 @@
-// Where every patch of the scene lies in the atlas, at every level. Immutable after it is made; the same arithmetic runs
-// on the server and, from the tables in the scene manifest, on every client.
+// Where every patch of the scene lies in the atlas, at every level. Immutable after it is made; the same arithmetic
+// runs on the server and, from the tables in the scene manifest, on every client.
 #pragma once
 
 #include <array>
@@ -20,10 +20,10 @@ namespace darm::atlas {
 struct Chart {
   std::uint32_t mesh = 0;
   std::uint32_t patch_count = 0;
-  std::vector<std::uint32_t> local_patch;           ///< per triangle; kDropped if the triangle has no texels
-  std::vector<std::array<glm::vec2, 3>> uv;         ///< per triangle corner
-  std::vector<glm::vec2> patch_size;                ///< per local patch: extent of uv, world units
-  std::vector<float> patch_area;                    ///< per local patch: world units squared
+  std::vector<std::uint32_t> local_patch;    ///< per triangle; kDropped if the triangle has no texels
+  std::vector<std::array<glm::vec2, 3>> uv;  ///< per triangle corner
+  std::vector<glm::vec2> patch_size;         ///< per local patch: extent of uv, world units
+  std::vector<float> patch_area;             ///< per local patch: world units squared
 };
 inline constexpr std::uint32_t kDroppedTriangle = 0xffffffffu;
 
@@ -44,12 +44,12 @@ struct Placement {
 };
 
 struct Level {
-  float density = 0;         ///< texels per world unit: q / 2^level
-  std::uint32_t width = 0;   ///< texels; a whole number of tiles
+  float density = 0;        ///< texels per world unit: q / 2^level
+  std::uint32_t width = 0;  ///< texels; a whole number of tiles
   std::uint32_t height = 0;
   std::uint32_t tiles_x = 0;
   std::uint32_t tiles_y = 0;
-  float occupancy = 0;       ///< surface area * density^2 / (width * height)
+  float occupancy = 0;                ///< surface area * density^2 / (width * height)
   std::vector<Placement> placements;  ///< per patch
 };
 
@@ -64,8 +64,8 @@ struct Layout {
   std::vector<Chart> charts;
   std::vector<InstanceCharts> instances;  ///< parallel to Scene::instances
   std::uint32_t patch_count = 0;
-  std::vector<Level> levels;              ///< at least one; the last is CoarseTex
-  double surface_area = 0;                ///< world units squared, back sides included
+  std::vector<Level> levels;  ///< at least one; the last is CoarseTex
+  double surface_area = 0;    ///< world units squared, back sides included
   std::vector<DroppedTriangles> dropped;
 
   [[nodiscard]] int coarse_level() const { return static_cast<int>(levels.size()) - 1; }

@@ -1,4 +1,5 @@
-// The immutable scene every other room reads. Made once by gltf_loader; never changed, shared by shared_ptr<const Scene>.
+// The immutable scene every other room reads. Made once by gltf_loader; never changed, shared by shared_ptr<const
+// Scene>.
 #pragma once
 
 #include <array>
@@ -51,16 +52,16 @@ struct Material {
   TextureRef metallic_roughness_texture;  ///< linear; G roughness, B metallic
   TextureRef normal_texture;              ///< linear
   float normal_scale = 1.0f;
-  glm::vec3 emissive{0.0f};      ///< emissiveFactor * emissiveStrength, nits (radiance)
-  TextureRef emissive_texture;   ///< sRGB
+  glm::vec3 emissive{0.0f};     ///< emissiveFactor * emissiveStrength, nits (radiance)
+  TextureRef emissive_texture;  ///< sRGB
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   float alpha_cutoff = 0.5f;
   bool double_sided = false;
-  bool unlit = false;            ///< KHR_materials_unlit: base colour is the radiance, no light is reflected
+  bool unlit = false;  ///< KHR_materials_unlit: base colour is the radiance, no light is reflected
   float ior = 1.5f;
-  float transmission = 0.0f;     ///< KHR_materials_transmission
+  float transmission = 0.0f;        ///< KHR_materials_transmission
   TextureRef transmission_texture;  ///< linear; R
-  float thickness = 0.0f;        ///< KHR_materials_volume; 0: thin-walled
+  float thickness = 0.0f;           ///< KHR_materials_volume; 0: thin-walled
   glm::vec3 attenuation_color{1.0f};
   float attenuation_distance = 0.0f;  ///< 0: no attenuation (glTF's infinity)
   [[nodiscard]] bool emits() const { return emissive.x > 0 || emissive.y > 0 || emissive.z > 0; }
@@ -74,14 +75,14 @@ struct Mesh {
   std::vector<glm::vec3> normals;   ///< never empty: made flat from the faces where the file has none; unit length
   std::vector<glm::vec4> tangents;  ///< xyz unit, w = handedness; empty unless the material has a normal map
   std::array<std::vector<glm::vec2>, 2> uvs;
-  std::vector<glm::vec4> colors;    ///< COLOR_0, linear
+  std::vector<glm::vec4> colors;  ///< COLOR_0, linear
   std::vector<glm::uvec3> triangles;
-  std::uint32_t material = 0;       ///< always valid: meshes without one get the default material
+  std::uint32_t material = 0;  ///< always valid: meshes without one get the default material
 };
 
-/// A mesh placed in the scene. `to_world` maps node space to recentred world space (Scene::origin subtracted in double).
-/// A negative determinant flips winding: the front of a triangle is the side from which its *world-space* vertices,
-/// taken in `Mesh::triangles` order, and then swapped when `flipped`, run counter-clockwise.
+/// A mesh placed in the scene. `to_world` maps node space to recentred world space (Scene::origin subtracted in
+/// double). A negative determinant flips winding: the front of a triangle is the side from which its *world-space*
+/// vertices, taken in `Mesh::triangles` order, and then swapped when `flipped`, run counter-clockwise.
 struct Instance {
   std::uint32_t mesh = 0;
   glm::mat4 to_world{1.0f};
@@ -140,9 +141,9 @@ struct Dropped {
 
 struct Scene {
   std::string path;
-  std::uint64_t hash = 0;       ///< of the file's bytes and everything it refers to, and of the lights and sky in force
-  glm::dvec3 origin{0.0};       ///< world = file coordinates - origin
-  glm::vec3 bounds_min{0.0f};   ///< recentred
+  std::uint64_t hash = 0;      ///< of the file's bytes and everything it refers to, and of the lights and sky in force
+  glm::dvec3 origin{0.0};      ///< world = file coordinates - origin
+  glm::vec3 bounds_min{0.0f};  ///< recentred
   glm::vec3 bounds_max{0.0f};
   std::vector<Image> images;
   std::vector<Material> materials;
@@ -151,8 +152,8 @@ struct Scene {
   std::vector<Object> objects;
   std::vector<Light> lights;
   Sky sky;
-  std::vector<NamedCamera> cameras;    ///< glTF cameras
-  std::vector<std::string> warnings;   ///< what is not supported and was left out, one line each
+  std::vector<NamedCamera> cameras;   ///< glTF cameras
+  std::vector<std::string> warnings;  ///< what is not supported and was left out, one line each
   std::vector<Dropped> dropped;
   /// Triangles over all instances.
   [[nodiscard]] std::uint64_t triangle_count() const {

@@ -16,7 +16,8 @@ bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.
 glm::dvec3 usable_up(const glm::dvec3& forward, glm::dvec3 up) {
   if (!finite(up) || glm::length(up) < 1e-12) up = {0, 1, 0};
   up = glm::normalize(up);
-  if (glm::length(glm::cross(forward, up)) < 1e-6) up = std::abs(forward.z) < 0.9 ? glm::dvec3{0, 0, -1} : glm::dvec3{0, 1, 0};
+  if (glm::length(glm::cross(forward, up)) < 1e-6)
+    up = std::abs(forward.z) < 0.9 ? glm::dvec3{0, 0, -1} : glm::dvec3{0, 1, 0};
   return up;
 }
 
