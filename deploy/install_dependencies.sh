@@ -6,11 +6,11 @@ set -euo pipefail
 build=(
   ca-certificates ccache cmake g++ git libavcodec-dev libavutil-dev libboost1.81-dev libcli11-dev libdraco-dev
   libegl-dev libegl-mesa0 libegl1 libeigen3-dev libembree-dev libfmt-dev libgl1-mesa-dri libgles-dev libglm-dev
-  libmeshoptimizer-dev libprotobuf-dev libspdlog-dev libstb-dev libswscale-dev libtbb-dev libtinygltf-dev
-  libtomlplusplus-dev libxxhash-dev libzstd-dev ninja-build nlohmann-json3-dev pkg-config prometheus-cpp-dev
+  libmeshoptimizer-dev libpng-dev libprotobuf-dev libspdlog-dev libstb-dev libtbb-dev libtinygltf-dev
+  libtomlplusplus-dev libxxhash-dev ninja-build nlohmann-json3-dev pkg-config prometheus-cpp-dev
   protobuf-compiler python3 zlib1g-dev
 )
-tests=(clang-19 clang-format-19 clang-tidy-19 libbenchmark-dev libclang-rt-19-dev libgmock-dev libgtest-dev)
+tests=(clang-19 clang-format-19 clang-tidy-19 libclang-rt-19-dev libgmock-dev libgtest-dev)
 
 packages=("${build[@]}")
 list=false
