@@ -34,7 +34,7 @@ mkdir -p state
 cat <<'TEXT'
 The daemon prints a ready line with its addresses once clients can connect; stop it with Ctrl-C. Then, in another terminal:
 
-  build/release/bin/darm-probe --server 127.0.0.1:9010 --camera door --size 1280x720 --seconds 20 --out picture.png
+  build/release/bin/darm-probe --server 127.0.0.1:9010 --setup config/scenes/default.toml --camera hall --size 1280x720 --seconds 20 --out picture.png
 
 A camera is a name from config/scenes/default.toml or "px,py,pz tx,ty,tz fovy". Metrics: http://127.0.0.1:9090/metrics
 TEXT

@@ -1,0 +1,76 @@
+"""A client at the other end of a socket shows the picture of the path tracer."""
+import subprocess
+import unittest
+import urllib.request
+from pathlib import Path
+
+from running import BIN, Daemon, Folder, SET_UP, probe, reference, wait_until
+
+KEYS = ["psnr", "mssim", "ceiling_psnr", "ceiling_mssim", "reference_psnr", "seconds_to_first_image",
+        "bytes_to_first_image", "coarser_fraction", "coarse_fraction", "frames", "no_changes", "latency_ms", "series"]
+
+
+class MainJob(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Folder()
+        path = cls.folder.__enter__()
+        cls.reference = reference(path)
+        cls.daemon = Daemon(Path(path) / "state")
+        cls.out = Path(path) / "picture.png"
+
+    @classmethod
+    def tearDownClass(cls):
+        code = cls.daemon.stop()
+        cls.folder.__exit__()
+        if code != 0:
+            raise AssertionError(f"the daemon stopped with {code}")
+
+    def metric(self, name):
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.daemon.metrics}/metrics", timeout=5) as page:
+            for line in page.read().decode().splitlines():
+                if line.startswith(name + " "):
+                    return float(line.split()[-1])
+        return None
+
+    def test_the_picture_matches_the_reference_and_the_report_holds_its_keys(self):
+        report = probe(self.daemon.tcp, self.out, "--seconds", "8", "--reference", self.reference,
+                       "--ceiling-seconds", "4", "--ceiling-phystex", "4096")
+        for key in KEYS:
+            self.assertIn(key, report)
+        self.assertGreater(report["psnr"], 25.0)
+        self.assertGreater(report["psnr"], report["ceiling_psnr"] - 3.0)
+        self.assertLess(report["coarse_fraction"], 0.05)
+        self.assertGreater(report["frames"], 0)
+        self.assertTrue(self.out.exists())
+
+    def test_a_second_client_gets_its_own_view_at_the_same_time(self):
+        first = subprocess.Popen(
+            [BIN / "darm-probe", "--server", f"127.0.0.1:{self.daemon.tcp}", "--setup", SET_UP, "--camera", "mirror",
+             "--size", "160x90", "--seconds", "4", "--out", str(self.out) + ".mirror.png", "--json"],
+            stdout=subprocess.PIPE, text=True)
+        second = probe(self.daemon.tcp, self.out, "--seconds", "4", camera="windows", size="160x90")
+        first.communicate(timeout=60)
+        self.assertEqual(first.returncode, 0)
+        self.assertGreater(second["frames"], 0)
+        self.assertEqual(second["frames_lost"], 0)
+
+    def test_a_client_that_vanishes_leaves_nothing_behind(self):
+        client = subprocess.Popen(
+            [BIN / "darm-probe", "--server", f"127.0.0.1:{self.daemon.tcp}", "--camera", "0,1.7,0 1,1.7,0 60", "--size",
+             "160x90", "--seconds", "60", "--out", str(self.out) + ".gone.png"], stdout=subprocess.DEVNULL)
+        wait_until(lambda: "session" in self.daemon.messages() and "opened" in self.daemon.messages(), 20, "opened")
+        client.kill()
+        client.wait()
+        opened = lambda: self.daemon.messages().count(": opened")
+        closed = lambda: self.daemon.messages().count(": closed")
+        wait_until(lambda: opened() > 0 and opened() == closed(), 20, "every opened session closed")
+
+    def test_a_stranger_hears_one_clear_error(self):
+        error = probe(1, self.out, "--seconds", "1", check=False)
+        self.assertEqual(len(error.strip().splitlines()), 1)
+        self.assertIn("127.0.0.1:1", error)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,27 @@
+"""kill -9 while light is computed, then a restart: the store is taken up, and the picture is there at once."""
+import re
+import signal
+import unittest
+from pathlib import Path
+
+from running import Daemon, Folder, probe, reference
+
+
+class Restart(unittest.TestCase):
+    def test_the_first_picture_after_a_kill_is_the_last_before(self):
+        with Folder() as folder:
+            truth = reference(folder)
+            state = Path(folder) / "state"
+            daemon = Daemon(state)
+            before = probe(daemon.tcp, Path(folder) / "before.png", "--seconds", "8", "--reference", truth)
+            daemon.stop(signal.SIGKILL)
+            daemon = Daemon(state)
+            tiles = int(re.search(r"radiance store: (\d+) tiles", daemon.messages()).group(1))
+            after = probe(daemon.tcp, Path(folder) / "after.png", "--seconds", "2", "--reference", truth)
+            self.assertEqual(daemon.stop(), 0)
+            self.assertGreater(tiles, 50)
+            self.assertGreater(after["psnr"], before["psnr"] - 0.5)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,83 @@
+"""Starts the real daemon and the real client for end-to-end tests."""
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+BIN = Path(os.environ["DARM_BIN"])
+SOURCE = Path(os.environ["DARM_SOURCE"])
+SCENES = Path(os.environ["DARM_SHARED_SCENES"])
+SET_UP = SOURCE / "config/scenes/default.toml"
+
+
+class Daemon:
+    """darmd serve on the default scene, at a low density so that a test takes seconds."""
+
+    def __init__(self, state_dir, *more):
+        self.log = tempfile.TemporaryFile("w+")
+        self.process = subprocess.Popen(
+            [BIN / "darmd", "serve", "--config", SET_UP, "--state-dir", state_dir, "--q", "16", "--address",
+             "127.0.0.1", "--tcp-port", "0", "--udp-port", "0", "--metrics-port", "0", "--allow-lossless", *more],
+            stdout=subprocess.PIPE, stderr=self.log, text=True)
+        self.ready = self.process.stdout.readline()
+        found = re.search(r"ready: tcp 127\.0\.0\.1:(\d+), udp port (\d+), metrics http://127\.0\.0\.1:(\d+)", self.ready)
+        if not found:
+            self.process.kill()
+            raise AssertionError("no ready line but: " + self.ready + self.messages())
+        self.tcp, self.udp, self.metrics = map(int, found.groups())
+
+    def messages(self):
+        self.log.seek(0)
+        return self.log.read()
+
+    def stop(self, number=signal.SIGTERM):
+        self.process.send_signal(number)
+        code = self.process.wait(timeout=20)
+        self.process.stdout.close()
+        self.log.close()
+        return code
+
+
+def probe(port, out, *more, check=True, camera="hall", size="320x180"):
+    """Runs darm-probe to its end; its report as a dict."""
+    done = subprocess.run(
+        [BIN / "darm-probe", "--server", f"127.0.0.1:{port}", "--setup", SET_UP, "--camera", camera, "--size", size,
+         "--out", out, "--json", *more], capture_output=True, text=True, timeout=120)
+    if check and done.returncode != 0:
+        raise AssertionError("darm-probe: " + done.stderr + done.stdout)
+    return json.loads(done.stdout) if done.returncode == 0 else done.stderr
+
+
+def reference(folder, camera="hall", size="320x180", spp=32):
+    """A small view-independent reference, rendered in a second or two by darmd itself."""
+    out = Path(folder) / "reference.png"
+    done = subprocess.run(
+        [BIN / "darmd", "render", "--config", SET_UP, "--camera", camera, "--size", size, "--spp", str(spp), "--effects",
+         "view-independent", "--state-dir", folder, "--out", out, "--json"], capture_output=True, text=True, timeout=120)
+    if done.returncode != 0:
+        raise AssertionError("darmd render: " + done.stderr)
+    return out.with_suffix(".pfm")
+
+
+def wait_until(condition, seconds, what):
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError("in %g s not: %s" % (seconds, what))
+        time.sleep(0.1)
+
+
+class Folder:
+    """A temporary folder as a context."""
+
+    def __enter__(self):
+        self.path = tempfile.mkdtemp(prefix="darm-e2e-")
+        return self.path
+
+    def __exit__(self, *_):
+        shutil.rmtree(self.path, ignore_errors=True)
