@@ -52,6 +52,8 @@ class StreamPlayer {
   [[nodiscard]] PageTable& pages() { return pages_; }
   [[nodiscard]] const PageTable& pages() const { return pages_; }
 
+  /// The picture shown now; of a coded stream, once a frame was applied.
+  [[nodiscard]] const Picture& picture() const { return picture_; }
   /// Newest picture of a coded stream, once per picture; null if there is no newer one.
   [[nodiscard]] const Picture* take_picture();
   /// Newest CoarseTex, once per version; null if there is no newer one.

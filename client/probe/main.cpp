@@ -19,7 +19,7 @@ struct Arguments {
   double until_error = -1, seconds = -1, ceiling_seconds = 0, series_interval = 0, updates_per_second = 10;
   std::uint32_t phystex = 2048, ceiling_phystex = 8192;
   unsigned bench_draw = 0;
-  bool lossless = false, no_444 = false, json = false;
+  bool lossless = false, no_444 = false, codec_check = false, json = false;
 };
 
 Result<Reference> read_reference(const std::string& file) {
@@ -76,6 +76,7 @@ Result<SessionPlan> make_plan(const Arguments& a) {
   plan.draw_times = draw_times(a, plan.seconds);
   plan.max_phystex = a.phystex;
   plan.lossless = a.lossless;
+  plan.keep_tiles = a.codec_check;
   plan.chroma_444 = !a.no_444;
   return plan;
 }
@@ -96,6 +97,19 @@ Result<Image8> ceiling_picture(const Arguments& a, SessionPlan plan) {
     if (auto ok = write_png(a.ceiling, session->picture); !ok) return std::unexpected(ok.error());
   }
   return std::move(session->picture);
+}
+
+// The same tiles without codec, from a session beside the first one's light.
+Result<std::optional<CodecScore>> check_codec(SessionPlan plan, const SessionReport& coded) {
+  plan.path = {camera_at(plan.path, plan.path.front().t + plan.seconds)};
+  plan.seconds = 15;
+  plan.until_error.reset();
+  plan.draw_times.clear();
+  plan.lossless = true;
+  plan.max_phystex = coded.phystex_size;
+  const auto lossless = run_session(plan, nullptr, 0);
+  if (!lossless) return fail("codec check: " + lossless.error().message);
+  return compare_tiles(coded.tiles, lossless->tiles);
 }
 
 Result<void> run(const Arguments& a) {
@@ -128,6 +142,11 @@ Result<void> run(const Arguments& a) {
     const auto score = compare(outcome.session.picture, *reference);
     if (!score) return std::unexpected(score.error());
     outcome.score = *score;
+  }
+  if (a.codec_check) {
+    const auto codec = check_codec(*plan, outcome.session);
+    if (!codec) return std::unexpected(codec.error());
+    outcome.codec = *codec;
   }
   if (a.ceiling_seconds > 0 || !a.ceiling.empty()) {
     const auto ceiling = ceiling_picture(a, *plan);
@@ -169,6 +188,8 @@ void declare(CLI::App& app, Arguments& a) {
       ->check(CLI::Range(0.1, 240.0));
   app.add_option("--series-interval", a.series_interval,
                  "seconds between points of the series (default: 1, 2, 5, 10, 20, 30, 60, ...)");
+  app.add_flag("--codec-check", a.codec_check,
+               "then compare each tile with a lossless session's: PSNR of PhysTex after the codec (a lower bound)");
   app.add_option("--bench-draw", a.bench_draw, "draw so many pictures at the end to measure frames/s");
   app.add_option("--out", a.out, "PNG of the last picture");
   app.add_flag("--json", a.json, "report as JSON on standard output");

@@ -40,6 +40,7 @@ class Run {
   const SessionPlan& plan_;
   const Reference* reference_;
   SessionReport report_;
+  std::unordered_map<std::uint16_t, std::string> kept_pixels_;  // newest lossless bytes of each slot
   std::unique_ptr<Connection> connection_;
   StreamShape shape_;
   std::optional<SceneModel> scene_;
@@ -114,6 +115,9 @@ Result<void> Run::handle_frame(const Received& message) {
   if (!fate) return std::unexpected(fate.error());
   decode_us_ = now_us() - before;
   if (*fate == FrameFate::kApplied) {
+    if (plan_.keep_tiles) {
+      for (const auto& pixels : frame.pixels()) kept_pixels_[static_cast<std::uint16_t>(pixels.slot())] = pixels.rgb();
+    }
     ++report_.frames;
     report_.key_frames += frame.key() ? 1 : 0;
     report_.error = frame.error();
@@ -266,6 +270,11 @@ Result<void> Run::finish(unsigned bench_draws) {
   const auto counts = renderer_->count_residency(*scene_, view_now());
   if (!counts) return std::unexpected(counts.error());
   report_.residency = *counts;
+  if (plan_.keep_tiles) {
+    const auto entries = scene_->tile_count();
+    report_.tiles = plan_.lossless ? tiles_of(kept_pixels_, player_->pages(), entries)
+                                   : tiles_of(player_->picture(), player_->pages(), entries);
+  }
   connection_->goodbye();
   if (bench_draws > 0) report_.draw_seconds.clear();
   for (unsigned i = 0; i < bench_draws; ++i) {

@@ -11,6 +11,7 @@
 #include "client/core/image_metrics.hpp"
 #include "client/core/renderer_gles.hpp"
 #include "client/probe/camera_path.hpp"
+#include "client/probe/codec_check.hpp"
 
 namespace darm::client::probe {
 
@@ -26,6 +27,7 @@ struct SessionPlan {
   std::uint32_t max_phystex = 2048;
   bool lossless = false;
   bool chroma_444 = true;
+  bool keep_tiles = false;  ///< report what each resident tile shows at the end
 };
 
 struct SeriesPoint {
@@ -53,6 +55,7 @@ struct SessionReport {
   std::string server;
   bool udp = false;
   std::uint32_t phystex_size = 0;
+  TilePlanes tiles;  ///< with keep_tiles
 };
 
 /// Runs the plan in the current GL context. `reference` (may be null) gives the series its PSNR.

@@ -45,6 +45,8 @@ std::string to_json(const Outcome& o) {
   j["ceiling_psnr"] = o.ceiling ? Json(o.ceiling->psnr) : Json(nullptr);
   j["ceiling_mssim"] = o.ceiling ? Json(o.ceiling->mssim) : Json(nullptr);
   j["reference_psnr"] = optional(o.reference_psnr);
+  j["codec_psnr"] = o.codec ? Json(o.codec->psnr) : Json(nullptr);
+  j["codec_tiles"] = o.codec ? Json(o.codec->tiles) : Json(nullptr);
   j["rmse"] = o.score ? Json(o.score->rmse) : Json(nullptr);
   j["error"] = s.error;
   j["seconds_to_first_image"] = s.seconds_to_first_image;

@@ -13,6 +13,7 @@ struct Outcome {
   SessionReport session;
   std::optional<PictureScore> score, ceiling;
   std::optional<double> reference_psnr;
+  std::optional<CodecScore> codec;
   bool benched = false;
 };
 
