@@ -6,6 +6,7 @@
 
 #include "actors/renderer/bsdf.hpp"
 #include "actors/renderer/sampling.hpp"
+#include "actors/scene/texture_sampling.hpp"
 
 namespace darm::renderer {
 namespace {
@@ -165,6 +166,8 @@ bool LightTransport::next_surface(Path& path, trace::Surface& s, MaterialPoint& 
   glm::vec3 segment_start = path.ray.origin;
   for (int layer = 0; layer < kMostLayers; ++layer) {
     if (!(path.camera ? rays_->closest_camera(path.ray, hit) : rays_->closest(path.ray, hit))) return false;
+    const auto& placed = rays_->instance(hit.instance);
+    scene::prefetch(*scene_, *placed.material, *placed.mesh, hit.triangle, hit.u, hit.v);
     s = trace::make_surface(*rays_, hit);
     m = make_material_point(*scene_, s);
     const auto& material = *s.placed->material;

@@ -7,6 +7,8 @@
 namespace darm::scene {
 namespace {
 
+constexpr std::size_t kStaysInCache = 64u << 10;  // bytes; smaller images need no prefetch
+
 std::array<float, 256> make_srgb_table() {
   std::array<float, 256> table{};
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -58,15 +60,49 @@ double reduced(float coordinate, Wrap wrap) {
   return c - std::floor(c);
 }
 
-struct Decoder {
-  const Image& image;
-  const std::array<float, 256>& color;
-
-  [[nodiscard]] glm::vec4 at(std::uint32_t x, std::uint32_t y) const {
-    const std::uint8_t* p = image.pixels.data() + (static_cast<std::size_t>(y) * image.width + x) * 4;
-    return {color[p[0]], color[p[1]], color[p[2]], kLinearTable[p[3]]};
-  }
+/// The (up to) four texels that a texture coordinate reads, and how far it lies between them. Nearest: all four equal.
+struct Footprint {
+  const std::uint8_t* upper_left;
+  const std::uint8_t* upper_right;
+  const std::uint8_t* lower_left;
+  const std::uint8_t* lower_right;
+  float fx, fy;
 };
+
+/// `image` must have pixels.
+Footprint locate(const Image& image, const TextureRef& texture, const glm::vec2& uv) {
+  const glm::mat3& t = texture.uv_transform;
+  double x = reduced(t[0][0] * uv.x + t[1][0] * uv.y + t[2][0], texture.wrap_s) * image.width;
+  double y = reduced(t[0][1] * uv.x + t[1][1] * uv.y + t[2][1], texture.wrap_t) * image.height;
+  if (!texture.nearest) {
+    x -= 0.5;
+    y -= 0.5;
+  }
+  const double left = std::floor(x);
+  const double top = std::floor(y);
+  const std::int64_t step = texture.nearest ? 0 : 1;
+  const auto ix = static_cast<std::int64_t>(left);
+  const auto iy = static_cast<std::int64_t>(top);
+  const std::size_t x0 = wrapped(ix, image.width, texture.wrap_s);
+  const std::size_t x1 = wrapped(ix + step, image.width, texture.wrap_s);
+  const std::uint8_t* row0 =
+      image.pixels.data() + std::size_t{wrapped(iy, image.height, texture.wrap_t)} * image.width * 4;
+  const std::uint8_t* row1 =
+      image.pixels.data() + std::size_t{wrapped(iy + step, image.height, texture.wrap_t)} * image.width * 4;
+  return {row0 + x0 * 4,
+          row0 + x1 * 4,
+          row1 + x0 * 4,
+          row1 + x1 * 4,
+          texture.nearest ? 0.0f : static_cast<float>(x - left),
+          texture.nearest ? 0.0f : static_cast<float>(y - top)};
+}
+
+/// The image of a texture, or null if it has none or an empty one.
+const Image* image_of(const Scene& scene, const TextureRef& texture) {
+  if (!texture.present() || static_cast<std::size_t>(texture.image) >= scene.images.size()) return nullptr;
+  const Image& image = scene.images[static_cast<std::size_t>(texture.image)];
+  return image.width == 0 || image.height == 0 ? nullptr : &image;
+}
 
 }  // namespace
 
@@ -86,32 +122,38 @@ glm::vec4 interpolate_color(const Mesh& mesh, std::uint32_t triangle, float u, f
 }
 
 glm::vec4 sample_at(const Scene& scene, const TextureRef& texture, glm::vec2 uv, TextureEncoding encoding) {
-  if (!texture.present() || static_cast<std::size_t>(texture.image) >= scene.images.size()) return glm::vec4(1.0f);
-  const Image& image = scene.images[static_cast<std::size_t>(texture.image)];
-  if (image.width == 0 || image.height == 0) return glm::vec4(1.0f);
-  const glm::vec3 moved = texture.uv_transform * glm::vec3(uv, 1.0f);
-  const Decoder texels{image, encoding == TextureEncoding::kSrgb ? kSrgbTable : kLinearTable};
-  const double x = reduced(moved.x, texture.wrap_s) * image.width;
-  const double y = reduced(moved.y, texture.wrap_t) * image.height;
-  const std::int64_t width = image.width;
-  const std::int64_t height = image.height;
-  if (texture.nearest) {
-    return texels.at(wrapped(static_cast<std::int64_t>(std::floor(x)), width, texture.wrap_s),
-                     wrapped(static_cast<std::int64_t>(std::floor(y)), height, texture.wrap_t));
+  const Image* image = image_of(scene, texture);
+  if (image == nullptr) return glm::vec4(1.0f);
+  const Footprint f = locate(*image, texture, uv);
+  const auto& color = encoding == TextureEncoding::kSrgb ? kSrgbTable : kLinearTable;
+  const float w11 = f.fx * f.fy;
+  const float w10 = f.fx - w11;
+  const float w01 = f.fy - w11;
+  const float w00 = 1.0f - f.fx - w01;
+  const auto mixed = [&](std::size_t channel, const std::array<float, 256>& table) {
+    return table[f.upper_left[channel]] * w00 + table[f.upper_right[channel]] * w10 +
+           table[f.lower_left[channel]] * w01 + table[f.lower_right[channel]] * w11;
+  };
+  return {mixed(0, color), mixed(1, color), mixed(2, color), mixed(3, kLinearTable)};
+}
+
+void prefetch(const Scene& scene, const Material& material, const Mesh& mesh, std::uint32_t triangle, float u,
+              float v) {
+  const TextureRef* const textures[] = {&material.normal_texture, &material.base_color_texture,
+                                        &material.metallic_roughness_texture};
+  int held = -1;
+  glm::vec2 uv(0.0f);
+  for (const TextureRef* texture : textures) {
+    const Image* image = image_of(scene, *texture);
+    if (image == nullptr || image->pixels.size() < kStaysInCache) continue;
+    if (texture->uv_set != held) {
+      held = texture->uv_set;
+      uv = interpolate_uv(mesh, texture->uv_set, triangle, u, v);
+    }
+    const Footprint f = locate(*image, *texture, uv);
+    __builtin_prefetch(f.upper_left);
+    __builtin_prefetch(f.lower_left);
   }
-  const double left = std::floor(x - 0.5);
-  const double top = std::floor(y - 0.5);
-  const auto fx = static_cast<float>(x - 0.5 - left);
-  const auto fy = static_cast<float>(y - 0.5 - top);
-  const auto ix = static_cast<std::int64_t>(left);
-  const auto iy = static_cast<std::int64_t>(top);
-  const std::uint32_t x0 = wrapped(ix, width, texture.wrap_s);
-  const std::uint32_t x1 = wrapped(ix + 1, width, texture.wrap_s);
-  const std::uint32_t y0 = wrapped(iy, height, texture.wrap_t);
-  const std::uint32_t y1 = wrapped(iy + 1, height, texture.wrap_t);
-  const glm::vec4 upper = texels.at(x0, y0) * (1.0f - fx) + texels.at(x1, y0) * fx;
-  const glm::vec4 lower = texels.at(x0, y1) * (1.0f - fx) + texels.at(x1, y1) * fx;
-  return upper * (1.0f - fy) + lower * fy;
 }
 
 glm::vec4 sample(const Scene& scene, const TextureRef& texture, const Mesh& mesh, std::uint32_t triangle, float u,

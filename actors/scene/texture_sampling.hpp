@@ -29,6 +29,10 @@ enum class TextureEncoding : std::uint8_t { kSrgb, kLinear };
 [[nodiscard]] glm::vec4 sample_at(const Scene& scene, const TextureRef& texture, glm::vec2 uv,
                                   TextureEncoding encoding);
 
+/// Asks the processor for the texels that a full look at `material` (normal, base colour, metallic-roughness) will read
+/// at the point, so that their way from memory overlaps. Changes nothing else.
+void prefetch(const Scene& scene, const Material& material, const Mesh& mesh, std::uint32_t triangle, float u, float v);
+
 /// `sample_at` the texture coordinate of a point of a triangle of `mesh`.
 [[nodiscard]] glm::vec4 sample(const Scene& scene, const TextureRef& texture, const Mesh& mesh, std::uint32_t triangle,
                                float u, float v, TextureEncoding encoding);
