@@ -35,11 +35,12 @@ if(DARM_SANITIZE)
   target_compile_options(darm_options INTERFACE -fsanitize=${DARM_SANITIZE} -fno-omit-frame-pointer -g1)
   target_link_options(darm_options INTERFACE -fsanitize=${DARM_SANITIZE})
 endif()
-# Sanitized template libraries take minutes to optimise, and only speed would be gained.
-set(DARM_SLOW_TO_OPTIMISE "#include [<\"](nlohmann/|tiny_gltf|draco/|boost/|toml|CLI/|spdlog/|prometheus/|.*\\.pb\\.h)")
 if(DARM_FUZZ)
   target_compile_options(darm_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
+
+# Sanitized template libraries take minutes to optimise, and only speed would be gained.
+set(DARM_SLOW_TO_OPTIMISE "#include [<\"](nlohmann/|tiny_gltf|draco/|boost/|toml|CLI/|spdlog/|prometheus/|.*\\.pb\\.h)")
 
 # darm_room(NAME [DIR d] [DEPENDS targets...] [PRIVATE targets...]): library darm_NAME from every .cpp in the folder.
 function(darm_room name)
