@@ -74,25 +74,28 @@ float largest_q(const Packer& packer, float too_large, std::uint64_t max_texels)
   return std::floor(q / digit) * digit;
 }
 
-Result<Level> finest_level(const scene::Scene& scene, const Packer& packer, const LayoutOptions& options, float& q) {
+Result<Level> finest_level(const scene::Scene& scene, const Packer& packer, const LayoutOptions& options, float q) {
   const auto refuse = [&] {
     return fail(fmt::format("{}: q={} needs more than max_texels={}; the largest q that fits is {}", scene.path, q,
                             options.max_texels, largest_q(packer, q, options.max_texels)));
   };
-  if (options.q > 0) {
-    if (packer.least_texels(q) > static_cast<double>(options.max_texels)) return refuse();
-    if (packer.own_texels(q) > options.max_texels) return refuse();
-    Level level = packer.pack(q);
-    if (texels_of(level) > options.max_texels) return refuse();
-    return level;
-  }
-  q = choose_q(packer);
+  if (packer.least_texels(q) > static_cast<double>(options.max_texels)) return refuse();
+  if (packer.own_texels(q) > options.max_texels) return refuse();
+  Level level = packer.pack(q);
+  if (texels_of(level) > options.max_texels) return refuse();
+  return level;
+}
+
+/// Automatic q: drops finest levels, which halves q each time, until level 0 is under its bound.
+Result<void> drop_to_bound(const scene::Scene& scene, const Packer& packer, const LayoutOptions& options, float& q,
+                           std::vector<Level>& levels) {
+  const auto bound = std::min(kAutoTexels, options.max_texels);
   for (int attempt = 0; attempt < 3; ++attempt, q /= 2) {
-    Level level = packer.pack(q);
-    if (texels_of(level) <= std::min(kAutoTexels, options.max_texels)) return level;
+    if (levels.empty()) levels.push_back(packer.pack(q));
+    if (texels_of(levels.front()) <= bound) return {};
+    levels.erase(levels.begin());
   }
-  return fail(fmt::format("{}: no q puts level 0 under {} texels; raise max_texels", scene.path,
-                          std::min(kAutoTexels, options.max_texels)));
+  return fail(fmt::format("{}: no q puts level 0 under {} texels; raise max_texels", scene.path, bound));
 }
 
 /// All levels. With more than one thread the coarser ones are packed beside level 0, as many as its area suggests.
@@ -105,29 +108,28 @@ Result<std::vector<Level>> pack_levels(const scene::Scene& scene, const Packer& 
   };
   std::vector<Level> levels;
   if (options.progress) options.progress("pack", 0);
-  if (options.q > 0 && options.threads > 1 && packer.least_texels(q) < static_cast<double>(options.max_texels)) {
-    // Guess the count from area; what is missing is packed below, what is too many is dropped.
-    std::size_t guess = 1;
+  if (options.q == 0) q = choose_q(packer);
+  const auto finest = [&]() -> Result<Level> {
+    if (options.q > 0) return finest_level(scene, packer, options, q);
+    return packer.pack(q);
+  };
+  // Guess the count from area; what is missing is packed below, what is too many is dropped.
+  std::size_t guess = 1;
+  if (options.threads > 1 && packer.least_texels(q) < static_cast<double>(options.max_texels))
     while (guess < kMaxLevels && packer.least_texels(std::ldexp(q, -static_cast<int>(guess) + 1)) > 0.8 * kCoarseTexels)
       ++guess;
-    std::vector<Result<Level>> packed(guess, Level{});
-    parallel_for(guess, options.threads, [&](std::size_t l) {
-      if (l == 0)
-        packed[0] = finest_level(scene, packer, options, q);
-      else
-        packed[l] = packer.pack(std::ldexp(options.q, -static_cast<int>(l)));
-      report();
-    });
-    for (auto& p : packed) {
-      if (!p) return std::unexpected(p.error());
-      levels.push_back(std::move(*p));
-    }
-  } else {
-    auto finest = finest_level(scene, packer, options, q);
-    if (!finest) return std::unexpected(finest.error());
-    levels.push_back(std::move(*finest));
+  std::vector<Result<Level>> packed(guess, Level{});
+  parallel_for(guess, options.threads, [&](std::size_t l) {
+    packed[l] = l == 0 ? finest() : packer.pack(std::ldexp(q, -static_cast<int>(l)));
     report();
+  });
+  for (auto& p : packed) {
+    if (!p) return std::unexpected(p.error());
+    levels.push_back(std::move(*p));
   }
+  if (options.q == 0)
+    if (auto bounded = drop_to_bound(scene, packer, options, q, levels); !bounded)
+      return std::unexpected(bounded.error());
   const auto is_last = [](std::size_t l, const Level& level) {
     return ends_levels(level) && (l > 0 || texels_of(level) <= kSingleLevelTexels);
   };

@@ -3,21 +3,30 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <deque>
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 #include <map>
+#include <optional>
 
 #include "actors/atlas/strip.hpp"
 
 namespace darm::atlas {
 namespace {
 
-/// A group holds this share of a level: of Sponza at q=64 two thousand tiles, about what one view shows.
-constexpr std::uint64_t kGroups = 16;
+/// Groups of a level. Fewer fill better; patches of over a third of a tile gain little from closer company.
+constexpr std::uint64_t kGroups = 4;
 /// Patches over this share of a level go before all groups, longest first: what sticks out of a group is never filled
 /// well. They fill tiles of their own, so little locality is lost.
 constexpr std::uint64_t kBigShare = 8000;
 constexpr std::int32_t kPreferredWidth = 64 * kTileSize;
+/// Patches under this go into pages.
+constexpr std::uint64_t kSmallTexels = kTileTexels / 3;
+constexpr std::int32_t kPageTiles = 2;
+/// A patch tries the pages that were begun last: more fill better, fewer keep neighbours closer.
+constexpr std::size_t kOpenPages = 3;
+/// Shapes whose shorter side is at least this are looked up by cells: the rounding costs them next to nothing.
+constexpr std::int32_t kCellSearchSide = 160;
 
 std::uint64_t spread_bits(std::uint64_t v) {  // 21 bits, two zeros between
   v = (v | v << 32) & 0x1f00000000ffffull;
@@ -75,6 +84,151 @@ std::uint32_t class_of(const Footprint& f) {
   return step(f.width) << 16 | step(f.height) << 8 | static_cast<std::uint32_t>(full * 3.999);
 }
 
+/// Orders one level's patches for the packer.
+class Sequence {
+ public:
+  Sequence(const PackOrder& order, const FootprintSet& footprints) : order_(order), footprints_(footprints) {}
+
+  [[nodiscard]] const Footprint& shape(std::uint32_t patch) const { return footprints_.shapes[order_.shape_of[patch]]; }
+  /// Big ones first, longest first; then groups of `group_texels` in the given order, each longest first.
+  [[nodiscard]] std::vector<std::uint32_t> grouped(const std::vector<std::uint32_t>& patches, std::uint64_t big,
+                                                   std::uint64_t group_texels) const {
+    std::vector<std::uint32_t> out;
+    out.reserve(patches.size());
+    for (const auto p : patches)
+      if (shape(p).texels >= big) out.push_back(p);
+    sort_from(out, 0);
+    std::size_t group = out.size();
+    std::uint64_t in_group = 0;
+    for (const auto p : patches) {
+      if (shape(p).texels >= big) continue;
+      out.push_back(p);
+      in_group += shape(p).texels;
+      if (in_group < group_texels) continue;
+      sort_from(out, group);
+      group = out.size();
+      in_group = 0;
+    }
+    sort_from(out, group);
+    return out;
+  }
+
+ private:
+  void sort_from(std::vector<std::uint32_t>& patches, std::size_t first) const {
+    std::stable_sort(patches.begin() + static_cast<std::ptrdiff_t>(first), patches.end(),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       const auto &x = shape(a), &y = shape(b);
+                       const auto round_x = x.height + x.width, round_y = y.height + y.width;
+                       return round_x != round_y ? round_x > round_y : x.height > y.height;
+                     });
+  }
+
+  const PackOrder& order_;
+  const FootprintSet& footprints_;
+};
+
+/// Where shapes of a class found their last place: none of them fits before it.
+class Starts {
+ public:
+  std::int32_t& of(const Footprint& f) { return start_[class_of(f)]; }
+
+ private:
+  std::map<std::uint32_t, std::int32_t> start_;
+};
+
+/// Puts small patches into square pages of a few tiles, in order, so that what is seen together shares tiles.
+class Pages {
+ public:
+  explicit Pages(std::int32_t side) : side_(side) {}
+
+  /// Index of the page, and the place in it.
+  std::pair<std::size_t, Place> put(const Footprint& f) {
+    for (auto& page : open_)
+      if (const auto place = fit(page, f)) return {page.index, *place};
+    if (open_.size() == kOpenPages) open_.pop_front();
+    open_.push_back({count_++, Strip(side_), {}});
+    return {open_.back().index, *fit(open_.back(), f)};
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  struct Page {
+    std::size_t index;
+    Strip strip;
+    Starts starts;
+  };
+
+  std::optional<Place> fit(Page& page, const Footprint& f) const {
+    auto& from = page.starts.of(f);
+    if (from + f.height > side_) return std::nullopt;
+    const Place place = page.strip.first_fit(f, from);
+    from = place.y;
+    if (place.y + f.height > side_) return std::nullopt;
+    page.strip.take(f, place);
+    return place;
+  }
+
+  std::int32_t side_;
+  std::size_t count_ = 0;
+  std::deque<Page> open_;
+};
+
+/// A level as it fills.
+class LevelPacker {
+ public:
+  LevelPacker(const Sequence& sequence, std::int32_t width, std::uint32_t patches)
+      : sequence_(sequence), strip_(width, true), placements_(patches) {}
+
+  void put_large(const std::vector<std::uint32_t>& patches) {
+    Starts starts;
+    for (const auto p : patches) {
+      const auto& f = sequence_.shape(p);
+      auto& from = starts.of(f);
+      Place place;
+      if (std::min(f.width, f.height) >= kCellSearchSide) {
+        place = strip_.coarse_fit(f, from);
+      } else {
+        place = strip_.first_fit(f, from);
+        from = place.y;
+      }
+      settle(p, place);
+    }
+  }
+
+  /// Fills pages in order, then puts each on the first free tiles after the page before it.
+  void put_small(const std::vector<std::uint32_t>& patches, std::int32_t side) {
+    Pages pages(side);
+    std::vector<std::vector<std::pair<std::uint32_t, Place>>> content;
+    for (const auto p : patches) {
+      const auto [page, in_page] = pages.put(sequence_.shape(p));
+      content.resize(pages.count());
+      content[page].emplace_back(p, in_page);
+    }
+    Place at;
+    for (const auto& page : content) {
+      while (!strip_.is_free(at, side, side)) {
+        at.x += kTileSize;
+        if (at.x + side > strip_.width()) at = {0, at.y + kTileSize};
+      }
+      for (const auto& [p, in_page] : page) settle(p, {at.x + in_page.x, at.y + in_page.y});
+    }
+  }
+
+  [[nodiscard]] const Strip& strip() const { return strip_; }
+  [[nodiscard]] std::vector<Placement> take_placements() { return std::move(placements_); }
+
+ private:
+  void settle(std::uint32_t patch, Place place) {
+    const auto& f = sequence_.shape(patch);
+    strip_.take(f, place);
+    placements_[patch] = {static_cast<std::uint32_t>(place.x), static_cast<std::uint32_t>(place.y), f.scale};
+  }
+
+  const Sequence& sequence_;
+  Strip strip_;
+  std::vector<Placement> placements_;
+};
+
 }  // namespace
 
 PackOrder order_patches(const scene::Scene& scene, const Charts& charts) {
@@ -100,7 +254,7 @@ PackOrder order_patches(const scene::Scene& scene, const Charts& charts) {
       const std::uint64_t morton = spread_bits(cell(0)) | spread_bits(cell(1)) << 1 | spread_bits(cell(2)) << 2;
       const auto bin = bin_of(places[local].normal);
       // Direction parts the cells of about an eighth of the scene, place the rest.
-      const auto key = [&](std::uint64_t b) { return (morton >> 21) << 33 | b << 30 | (morton & 0x1fffff); };
+      const auto key = [&](std::uint64_t b) { return (morton >> 27) << 33 | b << 30 | (morton & 0x7ffffff); };
       keyed.emplace_back(key(bin), use.front_base + local);
       order.shape_of[use.front_base + local] = first_shape[use.chart] + local;
       if (use.has_back()) {
@@ -125,58 +279,35 @@ FootprintSet footprints_at(const Charts& charts, const std::vector<PatchTriangle
 }
 
 Level pack_level(const Charts& charts, const PackOrder& order, const FootprintSet& footprints, float density) {
-  const auto shape = [&](std::uint32_t patch) -> const Footprint& { return footprints.shapes[order.shape_of[patch]]; };
+  const Sequence sequence(order, footprints);
   std::int32_t widest = 1;
   for (const auto& s : footprints.shapes) widest = std::max(widest, s.width);
   const auto square = static_cast<std::int32_t>(std::sqrt(static_cast<double>(footprints.texels)));
-  const auto wanted = std::max(std::min(square, kPreferredWidth), square / 4);
-  Strip strip(round_up(std::max(widest, wanted), kTileSize));
+  const auto wanted = std::max({std::min(square, kPreferredWidth), square / 4, kTileSize});
+  LevelPacker packer(sequence, round_up(std::max(widest, wanted), kTileSize), charts.patch_count);
 
-  const std::uint64_t big = std::max<std::uint64_t>(footprints.texels / kBigShare, 4);
-  const std::uint64_t group_texels = footprints.texels / kGroups;
-  const auto longer = [&](std::uint32_t a, std::uint32_t b) {
-    const auto &x = shape(a), &y = shape(b);
-    const auto round_x = x.height + x.width, round_y = y.height + y.width;
-    return round_x != round_y ? round_x > round_y : x.height > y.height;
-  };
-  std::vector<std::uint32_t> sequence;
-  sequence.reserve(order.patches.size());
-  for (const auto p : order.patches)
-    if (shape(p).texels >= big) sequence.push_back(p);
-  std::stable_sort(sequence.begin(), sequence.end(), longer);
-  std::size_t group = sequence.size();
-  std::uint64_t in_group = 0;
-  const auto close_group = [&] {
-    std::stable_sort(sequence.begin() + static_cast<std::ptrdiff_t>(group), sequence.end(), longer);
-    group = sequence.size();
-    in_group = 0;
-  };
+  // Small levels have small pages, else the last ones would weigh too much.
+  const std::int32_t side = std::clamp(square / 8 / kTileSize, 1, kPageTiles) * kTileSize;
+  const auto page_texels = static_cast<std::uint64_t>(side) * static_cast<std::uint64_t>(side);
+  std::vector<std::uint32_t> small, large;
   for (const auto p : order.patches) {
-    if (shape(p).texels >= big) continue;
-    sequence.push_back(p);
-    in_group += shape(p).texels;
-    if (in_group >= group_texels) close_group();
+    const auto& f = sequence.shape(p);
+    const bool in_page = f.texels < std::min(kSmallTexels, page_texels / 4) && f.width <= side && f.height <= side;
+    (in_page ? small : large).push_back(p);
   }
-  close_group();
+  packer.put_large(
+      sequence.grouped(large, std::max<std::uint64_t>(footprints.texels / kBigShare, 4), footprints.texels / kGroups));
+  packer.put_small(sequence.grouped(small, ~std::uint64_t{0}, page_texels), side);
 
   Level level;
   level.density = density;
-  level.placements.resize(charts.patch_count);
-  std::map<std::uint32_t, std::int32_t> start;
-  for (const auto p : sequence) {
-    const auto& f = shape(p);
-    auto& from = start[class_of(f)];
-    const Place place = strip.first_fit(f, from);
-    from = place.y;
-    strip.take(f, place);
-    level.placements[p] = {static_cast<std::uint32_t>(place.x), static_cast<std::uint32_t>(place.y), f.scale};
-  }
-  level.width = static_cast<std::uint32_t>(strip.width());
-  level.height = static_cast<std::uint32_t>(round_up(std::max(strip.height(), 1), kTileSize));
+  level.width = static_cast<std::uint32_t>(packer.strip().width());
+  level.height = static_cast<std::uint32_t>(round_up(std::max(packer.strip().height(), 1), kTileSize));
   level.tiles_x = level.width / kTileSize;
   level.tiles_y = level.height / kTileSize;
   level.occupancy =
       static_cast<float>(charts.surface_area * density * density / (static_cast<double>(level.width) * level.height));
+  level.placements = packer.take_placements();
   return level;
 }
 

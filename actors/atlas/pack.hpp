@@ -11,7 +11,7 @@
 namespace darm::atlas {
 
 /// Bumped whenever the same scene would be packed in another way: old caches are then refused.
-inline constexpr std::uint32_t kPackerVersion = 1;
+inline constexpr std::uint32_t kPackerVersion = 2;
 
 /// Patches in the order in which the packer fills the strip, in groups that are seen together (near in space, alike in
 /// direction). Shared by all levels.
@@ -30,8 +30,10 @@ struct FootprintSet {
 [[nodiscard]] FootprintSet footprints_at(const Charts& charts, const std::vector<PatchTriangles>& triangles,
                                          const PackOrder& order, float density);
 
-/// Packs one level. Shape-aware first fit into a strip a few tiles wide: big patches first, then group after group,
-/// each from its tallest patch on, small ones dropping into the holes that are left. No texel is owned twice.
+/// Packs one level. Shape-aware first fit: patches of more than a third of a tile go into a strip, big ones first, then
+/// group after group, each from its longest patch on, so that holes are filled. Smaller patches, of which a view sees
+/// thousands, go in order of place and direction into pages of 2x2 tiles, and the pages into tiles that are still free:
+/// a view then touches few tiles for their sake. No texel is owned twice.
 [[nodiscard]] Level pack_level(const Charts& charts, const PackOrder& order, const FootprintSet& footprints,
                                float density);
 

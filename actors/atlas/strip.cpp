@@ -4,13 +4,65 @@
 #include <bit>
 
 namespace darm::atlas {
+namespace {
 
-Strip::Strip(std::int32_t width)
+/// Bits [begin, end) of word `w` of a row.
+std::uint64_t bits_of(std::int32_t w, std::int32_t begin, std::int32_t end) {
+  const int lo = std::max(begin - w * 64, 0);
+  const int hi = std::min(end - w * 64, 64);
+  return (hi == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << hi) - 1) & ~std::uint64_t{0} << lo;
+}
+
+/// The cells that a shape at `place` touches, relative to the cell of `place`.
+Footprint cells_of(const Footprint& shape, Place place) {
+  const std::int32_t dx = place.x % kCell, dy = place.y % kCell;
+  Footprint out;
+  out.width = (dx + shape.width + kCell - 1) / kCell;
+  out.height = (dy + shape.height + kCell - 1) / kCell;
+  std::size_t first_band = 0;
+  std::vector<Span> row;
+  for (std::int32_t cell = 0; cell < out.height; ++cell) {
+    const auto top = cell * kCell - dy, bottom = top + kCell;
+    while (first_band < shape.bands.size() && shape.bands[first_band].row + shape.bands[first_band].rows <= top)
+      ++first_band;
+    row.clear();
+    for (auto b = first_band; b < shape.bands.size() && shape.bands[b].row < bottom; ++b)
+      for (const auto& s : shape.spans_of(shape.bands[b]))
+        row.push_back({(s.begin + dx) / kCell, (s.end + dx + kCell - 1) / kCell});
+    if (row.empty()) continue;
+    std::sort(row.begin(), row.end(), [](const Span& a, const Span& b) { return a.begin < b.begin; });
+    std::size_t kept = 0;
+    for (const auto& s : row) {
+      if (kept > 0 && s.begin <= row[kept - 1].end)
+        row[kept - 1].end = std::max(row[kept - 1].end, s.end);
+      else
+        row[kept++] = s;
+    }
+    row.resize(kept);
+    if (!out.bands.empty()) {
+      auto& last = out.bands.back();
+      const auto before = out.spans_of(last);
+      if (last.row + last.rows == cell && std::equal(before.begin(), before.end(), row.begin(), row.end())) {
+        ++last.rows;
+        continue;
+      }
+    }
+    out.bands.push_back(
+        {cell, 1, static_cast<std::uint32_t>(out.spans.size()), static_cast<std::uint32_t>(row.size())});
+    out.spans.insert(out.spans.end(), row.begin(), row.end());
+  }
+  return out;
+}
+
+}  // namespace
+
+Strip::Strip(std::int32_t width, bool with_cells)
     : width_(width),
       words_((static_cast<std::size_t>(width) + 63) / 64),
       and_(words_),
       eroded_(words_),
-      mask_(words_) {}
+      mask_(words_),
+      coarse_(with_cells ? std::make_unique<Strip>((width + kCell - 1) / kCell) : nullptr) {}
 
 void Strip::grow(std::int32_t rows) {
   const auto have = static_cast<std::int32_t>(longest_run_.size());
@@ -182,7 +234,43 @@ Place Strip::first_fit(const Footprint& shape, std::int32_t from_y) {
   }
 }
 
+bool Strip::fits(const Footprint& shape, Place place) const {
+  for (const auto& band : shape.bands)
+    for (const auto& s : shape.spans_of(band))
+      if (!is_free({place.x + s.begin, place.y + band.row}, s.end - s.begin, band.rows)) return false;
+  return true;
+}
+
+bool Strip::is_free(Place place, std::int32_t width, std::int32_t height) const {
+  const auto begin = place.x, end = place.x + width;
+  if (begin < 0 || place.y < 0 || end > width_) return false;
+  for (auto y = place.y; y < std::min(place.y + height, height_); ++y) {
+    const auto* words = row(y);
+    for (auto w = begin / 64; w <= (end - 1) / 64; ++w)
+      if ((~words[w] & bits_of(w, begin, end)) != 0) return false;
+  }
+  return true;
+}
+
+Place Strip::coarse_fit(const Footprint& shape, std::int32_t& from_y) {
+  const auto cells = cells_of(shape, {});
+  if (cells.width * kCell > width_) {  // too wide for the grid, not for the strip
+    const Place place = first_fit(shape, from_y);
+    from_y = place.y;
+    return place;
+  }
+  const Place found = coarse_->first_fit(cells, from_y / kCell);
+  Place place{found.x * kCell, found.y * kCell};
+  from_y = place.y;
+  constexpr int kMoves = 2 * kCell;
+  for (int i = 0; i < kMoves && fits(shape, {place.x, place.y - 1}); ++i) --place.y;
+  for (int i = 0; i < kMoves && fits(shape, {place.x - 1, place.y}); ++i) --place.x;
+  for (int i = 0; i < kMoves && fits(shape, {place.x, place.y - 1}); ++i) --place.y;
+  return place;
+}
+
 void Strip::take(const Footprint& shape, Place place) {
+  if (coarse_) coarse_->take(cells_of(shape, place), {place.x / kCell, place.y / kCell});
   grow(place.y + shape.height);
   height_ = std::max(height_, place.y + shape.height);
   for (const auto& band : shape.bands) {
@@ -192,13 +280,7 @@ void Strip::take(const Footprint& shape, Place place) {
       for (const auto& s : shape.spans_of(band)) {
         const auto begin = place.x + s.begin;
         const auto end = place.x + s.end;
-        for (auto w = begin / 64; w <= (end - 1) / 64; ++w) {
-          const int lo = std::max(begin - w * 64, 0);
-          const int hi = std::min(end - w * 64, 64);
-          const std::uint64_t bits = (hi == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << hi) - 1) & ~std::uint64_t{0}
-                                                                                                         << lo;
-          words[w] &= ~bits;
-        }
+        for (auto w = begin / 64; w <= (end - 1) / 64; ++w) words[w] &= ~bits_of(w, begin, end);
       }
       longest_run_[static_cast<std::size_t>(y)] = longest_run(words);
     }
