@@ -31,12 +31,14 @@ using Sessions = runtime::Registry<SessionId, session::Inbox>;
 using Work = boost::asio::executor_work_guard<boost::asio::io_context::executor_type>;
 
 constexpr std::size_t kMailbox = 4096;
+constexpr Microseconds kRefineInterval = 300'000;
 constexpr auto kGoodbyeTime = std::chrono::milliseconds(1500);
 
 tile_scheduler::SchedulerOptions scheduler_options(const config::Config& config) {
   tile_scheduler::SchedulerOptions options;
   options.updates_per_second = config.stream.updates_per_second;
   options.stream.max_writes = config.stream.max_writes;
+  options.stream.refine_interval = kRefineInterval;
   return options;
 }
 

@@ -35,7 +35,7 @@ StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& 
   enter_new(frame, wanted, images);
   if (key_pending_)
     write_all(frame, images);
-  else
+  else if (!frame.writes.empty() || now - sent_at_ >= options_.refine_interval)
     refine(frame, wanted, images);
   for (const auto& edit : key_pending_ ? table_.whole() : table_.take_edits()) frame.edits.push_back(edit_of(edit));
   if (key_pending_) static_cast<void>(table_.take_edits());

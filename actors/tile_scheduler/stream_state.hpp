@@ -29,6 +29,9 @@ using ImageLookup = std::function<const StoredImage*(TileId)>;
 struct StreamOptions {
   std::size_t max_writes = 2048;        ///< slots written per frame, key frames excepted; at least 1
   Microseconds lost_after = 2'000'000;  ///< a frame not reported done after this counts as failed
+  /// Least time between frames that only refine what is shown: encoding one costs the same whether it holds one tile or
+  /// a hundred, and that time is taken from shading. Frames with new tiles never wait.
+  Microseconds refine_interval = 0;
 };
 
 /// Slots of a PhysTex; at most 65535, because slots are named by 16 bits and one value means none.

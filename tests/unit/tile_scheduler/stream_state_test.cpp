@@ -197,6 +197,31 @@ TEST(StreamState, NewTilesComeBeforeRefinementsWithinTheLimit) {
   EXPECT_EQ(next.frame->edits.size(), 2u);
 }
 
+TEST(StreamState, RefinementsWaitForTheIntervalButNewTilesDoNot) {
+  Images images;
+  const TileId first(0, 1), second(0, 2);
+  images.put(first, 1);
+  StreamOptions options;
+  options.refine_interval = 300'000;
+  StreamState stream(small(), options);
+  const std::vector<TileId> wanted{first, second};
+  const auto start = stream.step(wanted, images.lookup(), 0, 1'000'000);
+  ASSERT_TRUE(start.frame.has_value());
+  stream.frame_done(start.frame->frame, true);
+
+  images.put(first, 2);
+  EXPECT_FALSE(stream.step(wanted, images.lookup(), 0, 1'100'000).frame.has_value());
+  images.put(second, 1);
+  const auto entered = stream.step(wanted, images.lookup(), 0, 1'200'000);
+  ASSERT_TRUE(entered.frame.has_value());
+  EXPECT_EQ(entered.frame->writes.size(), 2u);  // the refinement rides along
+  stream.frame_done(entered.frame->frame, true);
+
+  images.put(first, 3);
+  EXPECT_FALSE(stream.step(wanted, images.lookup(), 0, 1'400'000).frame.has_value());
+  EXPECT_TRUE(stream.step(wanted, images.lookup(), 0, 1'500'000).frame.has_value());
+}
+
 TEST(SlotCount, IsBoundedByTheNamesOfSlots) {
   StreamFormat f;
   EXPECT_EQ(slot_count(f), 4096u);
