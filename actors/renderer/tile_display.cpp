@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/outliers.hpp"
 #include "actors/renderer/tile_fill.hpp"
 
 namespace darm::renderer {
@@ -150,6 +151,7 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   const int radius = radius_of(mask);
   if (radius > 0) {
     gather(radius);
+    tame_outliers(window_);
     filter_.run(window_, options_.filter_samples, filtered_);
   } else {
     filtered_.assign(kSlotTexels, FilteredTexel{});

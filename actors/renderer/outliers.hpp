@@ -1,0 +1,19 @@
+// Keeps rare bright samples from being smeared into spots while there are too few samples to average them away.
+#pragma once
+
+#include "actors/renderer/filter_irradiance.hpp"
+
+namespace darm::renderer {
+
+/// Samples from which a texel is left as it is.
+inline constexpr float kOutlierSamples = 256;
+
+/// How many times the mean of its neighbours (5x5, same patch, itself left out) a texel of `count` samples may shine:
+/// 2 + count / 8. Grows with the samples, so that in the limit nothing is held down; what is held down meanwhile
+/// darkens the picture, never the store.
+[[nodiscard]] float outlier_bound(float count);
+
+/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike.
+void tame_outliers(FilterWindow& window);
+
+}  // namespace darm::renderer
