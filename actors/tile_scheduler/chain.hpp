@@ -33,9 +33,8 @@ struct TileHash {
 };
 struct ChainHash {
   std::size_t operator()(const Chain& c) const {
-    const auto pair = [&](int i) {
-      return (static_cast<std::uint64_t>(c.tiles[static_cast<std::size_t>(i)].packed) << 32) |
-             c.tiles[static_cast<std::size_t>(i + 1)].packed;
+    const auto pair = [&](std::size_t i) {
+      return (static_cast<std::uint64_t>(c.tiles[i].packed) << 32) | c.tiles[i + 1].packed;
     };
     return MixHash::mix(pair(0) * 0x9e3779b97f4a7c15ull ^ MixHash::mix(pair(2)));
   }
