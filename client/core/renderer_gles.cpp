@@ -200,6 +200,7 @@ void GlesRenderer::State::add_chunk(const SceneModel& scene, std::uint32_t index
   gpu.indices =
       gles::make_buffer(GL_ELEMENT_ARRAY_BUFFER, chunk.indices.data(), chunk.indices.size() * sizeof(std::uint32_t));
   gpu.index_count = static_cast<GLsizei>(chunk.indices.size());
+  // GL takes offsets as pointers. NOLINTNEXTLINE(performance-no-int-to-ptr)
   const auto at = [](std::size_t offset) { return reinterpret_cast<const void*>(offset); };
   glEnableVertexAttribArray(0);
   glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(Vertex), at(offsetof(Vertex, position)));
