@@ -25,5 +25,5 @@ if [[ $step == build ]]; then
   [[ ${#targets[@]} -gt 0 ]] || { echo "sanitized.sh: no tests match $tests" >&2; exit 1; }
   NINJA_STATUS="[$preset %f/%t %es] " ninja -C "build/$preset" "${targets[@]}"
 else
-  exec ctest --test-dir "build/$preset" -R "$tests" --output-on-failure --no-tests=error --timeout 600 -j "$(nproc)"
+  exec ctest --test-dir "build/$preset" -R "$tests" --output-on-failure --no-tests=error -j "$(nproc)"
 fi
