@@ -115,18 +115,10 @@ glm::vec3 LightSet::arriving(const Punctual& light, const glm::vec3& position) {
   return light.intensity * (factor * spot * spot);
 }
 
-PunctualDraw LightSet::draw_punctual(const glm::vec3& position, const glm::vec3& normal, bool both_sides,
-                                     float xi) const {
-  const std::size_t n = punctual_.size();
-  if (n > kAllLights) {
-    const auto i = punctual_table_.draw(xi);
-    const float p = punctual_table_.probability(i);
-    if (!(p > 0)) return {};
-    return {punctual_[i].position, arriving(punctual_[i], position) / p};
-  }
-  std::array<float, kAllLights> weight;
+float LightSet::weigh_punctual(const glm::vec3& position, const glm::vec3& normal, bool both_sides,
+                               std::span<float> weight) const {
   const float behind = both_sides ? 1.0f : 0.0f;
-  for (std::size_t i = 0; i < n; ++i) {
+  for (std::size_t i = 0; i < weight.size(); ++i) {
     const float x = punctual_x_[i] - position.x;
     const float y = punctual_y_[i] - position.y;
     const float z = punctual_z_[i] - position.z;
@@ -137,7 +129,7 @@ PunctualDraw LightSet::draw_punctual(const glm::vec3& position, const glm::vec3&
     weight[i] = punctual_power_[i] * cosine / (square * length);
   }
   float sum = 0;
-  for (std::size_t i = 0; i < n; ++i) {
+  for (std::size_t i = 0; i < weight.size(); ++i) {
     // A light that cannot reach this point by its cone or range needs no draw.
     if (punctual_[i].spot_scale > 0 || punctual_[i].inverse_range2 > 0) {
       const glm::vec3 a = arriving(punctual_[i], position);
@@ -145,16 +137,39 @@ PunctualDraw LightSet::draw_punctual(const glm::vec3& position, const glm::vec3&
     }
     sum += weight[i];
   }
-  if (!(sum > 0) || !std::isfinite(sum)) return {};
-  float left = xi * sum;
-  std::size_t chosen = n;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!(weight[i] > 0)) continue;
-    chosen = i;
-    left -= weight[i];
-    if (left < 0) break;
+  return sum;
+}
+
+std::size_t LightSet::draw_punctual(const glm::vec3& position, const glm::vec3& normal, bool both_sides, float xi,
+                                    std::span<PunctualDraw> out) const {
+  const std::size_t n = punctual_.size();
+  if (n > kAllLights) {
+    const auto i = punctual_table_.draw(xi);
+    const float p = punctual_table_.probability(i);
+    if (!(p > 0)) return 0;
+    out[0] = {punctual_[i].position, arriving(punctual_[i], position) / p};
+    return 1;
   }
-  return {punctual_[chosen].position, arriving(punctual_[chosen], position) * (sum / weight[chosen])};
+  std::array<float, kAllLights> weights;
+  const std::span<float> weight(weights.data(), n);
+  const float sum = weigh_punctual(position, normal, both_sides, weight);
+  if (!(sum > 0) || !std::isfinite(sum)) return 0;
+  // Systematic sampling: picks at (k + xi) / out.size() of the summed weights. A light that several picks meet is
+  // returned once, with their number as weight.
+  const float step = sum / static_cast<float>(out.size());
+  float next_pick = xi * step;
+  float reached = 0;
+  std::size_t picks = 0;
+  std::size_t made = 0;
+  for (std::size_t i = 0; i < n && picks < out.size(); ++i) {
+    reached += weight[i];
+    std::size_t mine = 0;
+    for (; picks < out.size() && next_pick < reached; ++picks, ++mine) next_pick += step;
+    if (mine == 0) continue;
+    out[made++] = {punctual_[i].position,
+                   arriving(punctual_[i], position) * (step * static_cast<float>(mine) / weight[i])};
+  }
+  return made;
 }
 
 EmitterDraw LightSet::draw_emitter(float xi, const glm::vec2& point) const {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "actors/renderer/sampling.hpp"
@@ -52,11 +53,13 @@ class LightSet {
   [[nodiscard]] bool has_punctual() const { return !punctual_.empty(); }
   [[nodiscard]] bool has_emitters() const { return !emitters_.empty(); }
 
-  /// One point or spot light for a receiver at `position`, with a probability proportional to its unshadowed irradiance
-  /// there (all lights are looked at up to kAllLights; beyond, by intensity). `normal`: cosine to weight with.
-  /// `both_sides`: the receiver also takes light from behind. Every light that can contribute has a probability > 0.
-  [[nodiscard]] PunctualDraw draw_punctual(const glm::vec3& position, const glm::vec3& normal, bool both_sides,
-                                           float xi) const;
+  /// Point and spot lights for a receiver at `position`: out.size() (>= 1) picks, each with a probability proportional
+  /// to a light's unshadowed irradiance there (all lights are looked at up to kAllLights; beyond, one pick by
+  /// intensity), spread evenly from `xi` in [0, 1). The irradiances sum to an unbiased estimate of what arrives
+  /// unshadowed. `normal`: cosine to weight with. `both_sides`: the receiver also takes light from behind. Every light
+  /// that can contribute has a probability > 0. Returns how many different lights were picked.
+  std::size_t draw_punctual(const glm::vec3& position, const glm::vec3& normal, bool both_sides, float xi,
+                            std::span<PunctualDraw> out) const;
   static constexpr std::size_t kAllLights = 256;
 
   /// A point on an emissive triangle, triangles drawn by power.
@@ -65,6 +68,9 @@ class LightSet {
   [[nodiscard]] float emitter_pdf(std::uint32_t instance, std::uint32_t triangle) const;
 
  private:
+  /// Fills in the weights of the first lights; returns their sum.
+  float weigh_punctual(const glm::vec3& position, const glm::vec3& normal, bool both_sides,
+                       std::span<float> weight) const;
   struct Punctual {
     glm::vec3 position{0.0f};
     glm::vec3 intensity{0.0f};

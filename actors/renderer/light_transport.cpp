@@ -1,8 +1,10 @@
 #include "actors/renderer/light_transport.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <span>
 
 #include "actors/renderer/bsdf.hpp"
 #include "actors/renderer/sampling.hpp"
@@ -14,6 +16,7 @@ namespace {
 constexpr int kMostLayers = 256;           // surfaces one straight ray may pass through
 constexpr float kShortOfTarget = 0.9999f;  // shadow rays end before the lamp they aim at
 constexpr std::size_t kSunsEach = 4;       // up to so many suns get a shadow ray each; of more, one is drawn
+constexpr std::size_t kMostPicks = 4;      // lamps drawn at the first vertex, where their noise is seen directly
 
 float largest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
@@ -125,18 +128,23 @@ glm::vec3 LightTransport::suns_at(const trace::Surface& s, const Scatter& scatte
 }
 
 template <class Scatter>
-glm::vec3 LightTransport::punctual_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const {
+glm::vec3 LightTransport::punctual_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler,
+                                      std::size_t picks) const {
   if (!lights_.has_punctual()) return glm::vec3(0.0f);
-  const PunctualDraw light =
-      lights_.draw_punctual(s.position, scatter.normal(), scatter.transmits(), sampler.next_1d());
-  if (largest(light.irradiance) <= 0) return glm::vec3(0.0f);
-  const glm::vec3 to = light.position - s.position;
-  const float square = glm::dot(to, to);
-  if (!(square > 1e-20f)) return glm::vec3(0.0f);
-  float pdf = 0;
-  const glm::vec3 f = scatter.evaluate(to * (1.0f / std::sqrt(square)), pdf);
-  if (largest(f) <= 0) return glm::vec3(0.0f);
-  return f * light.irradiance * visibility(s, to, &light.position);
+  std::array<PunctualDraw, kMostPicks> draws;
+  const std::size_t made = lights_.draw_punctual(s.position, scatter.normal(), scatter.transmits(), sampler.next_1d(),
+                                                 std::span(draws).first(picks));
+  glm::vec3 sum(0.0f);
+  for (const auto& light : std::span(draws).first(made)) {
+    if (largest(light.irradiance) <= 0) continue;
+    const glm::vec3 to = light.position - s.position;
+    const float square = glm::dot(to, to);
+    if (!(square > 1e-20f)) continue;
+    float pdf = 0;
+    const glm::vec3 f = scatter.evaluate(to * (1.0f / std::sqrt(square)), pdf);
+    if (largest(f) > 0) sum += f * light.irradiance * visibility(s, to, &light.position);
+  }
+  return sum;
 }
 
 template <class Scatter>
@@ -224,7 +232,7 @@ glm::vec3 LightTransport::trace_path(Path path, Sampler& sampler) const {
     if (m.unlit || path.bounce >= options_.max_bounces) return light;
     const BsdfScatter scatter(s, m, -path.ray.direction);
     light += path.throughput *
-             (suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler) + emitters_at(s, scatter, sampler));
+             (suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, 1) + emitters_at(s, scatter, sampler));
     const BsdfSample next = scatter.sample(sampler);
     if (!(next.pdf > 0)) return light;
     path.throughput *= next.weight;
@@ -246,7 +254,7 @@ glm::vec3 LightTransport::trace_path(Path path, Sampler& sampler) const {
 ViewIndependentLight LightTransport::diffuse_light(const trace::Surface& s, Sampler& sampler) const {
   const DiffuseScatter scatter{s};
   ViewIndependentLight made;
-  made.sharp = finite_or_black(suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler));
+  made.sharp = finite_or_black(suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, kMostPicks));
   made.soft = emitters_at(s, scatter, sampler);
   glm::vec3 t, b;
   trace::make_frame(s.normal, t, b);

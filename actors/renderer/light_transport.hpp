@@ -78,7 +78,8 @@ class LightTransport {
   template <class Scatter>
   [[nodiscard]] glm::vec3 suns_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
   template <class Scatter>
-  [[nodiscard]] glm::vec3 punctual_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
+  [[nodiscard]] glm::vec3 punctual_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler,
+                                      std::size_t picks) const;
   template <class Scatter>
   [[nodiscard]] glm::vec3 emitters_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
   [[nodiscard]] glm::vec3 trace_path(Path path, Sampler& sampler) const;
