@@ -224,8 +224,10 @@ Place Strip::first_fit(const Footprint& shape, std::int32_t from_y) {
       mask_[i] = left >= 64 ? ~std::uint64_t{0} : left <= 0 ? 0 : (std::uint64_t{1} << left) - 1;
     }
     std::int32_t skip = 0;
-    for (const auto& probe : probes_)
-      if ((skip = test(probe, y)) != 0) break;
+    for (const auto& probe : probes_) {
+      skip = test(probe, y);
+      if (skip != 0) break;
+    }
     if (skip == 0) {
       for (std::size_t i = 0; i < words_; ++i)
         if (mask_[i] != 0) return {static_cast<std::int32_t>(i * 64) + std::countr_zero(mask_[i]), y};

@@ -137,7 +137,7 @@ float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const
       continue;
     }
     const std::uint8_t* rgb = &image.rgb[at * 3];
-    const auto code = static_cast<std::uint8_t>(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2] + 0.5f);
+    const auto code = static_cast<std::uint8_t>(std::lround(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]));
     const double e = double{srgb_slope(code)} * options_.exposure * std::sqrt(double{std::max(variance[at], 0.0f)});
     squares += std::min(e * e, 0.25);
   }

@@ -107,7 +107,7 @@ void advise_huge_pages(const std::vector<T>& array) {
   if (bytes < kHuge / 4) return;
   const auto first = reinterpret_cast<std::uintptr_t>(array.data());
   for (auto page = first & ~(kHuge - 1); page < first + bytes; page += kHuge) {
-    void* at = reinterpret_cast<void*>(page);
+    void* at = reinterpret_cast<void*>(page);  // NOLINT(performance-no-int-to-ptr): a page, not an object
     ::madvise(at, kHuge, MADV_HUGEPAGE);
     ::madvise(at, kHuge, kCollapse);
   }
