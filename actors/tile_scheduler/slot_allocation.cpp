@@ -4,6 +4,8 @@
 #include <numeric>
 #include <queue>
 
+#include "actors/tile_scheduler/tile_detail.hpp"
+
 namespace darm::tile_scheduler {
 namespace {
 
@@ -18,6 +20,7 @@ class Problem {
     links_.resize(request.chains.size());
     loss_.resize(request.chains.size());
     for (std::size_t c = 0; c < request.chains.size(); ++c) read_chain(c);
+    if (request.detail) scale_losses();
     make_entries();
     resident_.assign(tiles_.size(), false);
     for (const auto tile : request.residents)
@@ -89,6 +92,33 @@ class Problem {
     }
     for (int i = 0; i <= kChainLength; ++i)
       loss_[c][static_cast<std::size_t>(i)] = serving_loss(chain, i, request_.coarse_level, options_);
+  }
+
+  void scale_losses() {
+    std::vector<float> known(tiles_.size(), -1.0f);
+    std::vector<bool> asked(tiles_.size(), false);
+    std::vector<float> detail(request_.chains.size(), -1.0f);
+    double sum = 0;
+    double weight = 0;
+    for (std::size_t c = 0; c < request_.chains.size(); ++c) {
+      for (const auto tile : request_.chains[c].chain.tiles) {
+        if (tile == kNoTile || detail[c] >= 0) continue;
+        const auto number = tiles_.find(tile);
+        if (!asked[number]) known[number] = request_.detail(tile);
+        asked[number] = true;
+        detail[c] = known[number];
+      }
+      if (detail[c] < 0) continue;
+      sum += double(request_.chains[c].weight) * double(detail[c]);
+      weight += double(request_.chains[c].weight);
+    }
+    if (!(weight > 0)) return;
+    const auto usual = static_cast<float>(sum / weight);
+    for (std::size_t c = 0; c < loss_.size(); ++c) {
+      if (detail[c] < 0) continue;
+      const float factor = detail_factor(detail[c], usual);
+      for (auto& loss : loss_[c]) loss *= factor;
+    }
   }
 
   void make_entries() {

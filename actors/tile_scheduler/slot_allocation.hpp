@@ -24,6 +24,9 @@ struct AllocationRequest {
   std::span<const WeightedChain> chains;  ///< distinct chains, weights >= 0
   std::span<const TileId> residents;      ///< distinct tiles
   std::function<bool(TileId)> available;  ///< tiles that may be granted; null: all
+  /// detail_of() the tile's picture, negative if there is none; null: none is known. A chain's losses are scaled by the
+  /// detail of its finest known tile, so that slots go where a coarser level would show.
+  std::function<float(TileId)> detail;
   std::size_t slots = 0;
   int coarse_level = 0;  ///< Layout::coarse_level()
 };

@@ -71,8 +71,12 @@ std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout&
 }
 
 AllocationRequest allocation_request(const ViewDemand& demand, std::span<const TileId> residents, std::size_t slots,
-                                     int coarse_level) {
+                                     int coarse_level, const ImageLookup& images) {
   AllocationRequest request;
+  request.detail = [&images](TileId tile) {
+    const auto* stored = images(tile);
+    return stored != nullptr && stored->image != nullptr ? stored->detail : -1.0f;
+  };
   request.chains = demand.chains;
   request.residents = residents;
   request.slots = slots;
@@ -93,7 +97,7 @@ ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const P
   demand.chains = set.chains();
   const auto residents = table.residents();
   demand.target =
-      allocate_slots(allocation_request(demand, residents, table.capacity(), layout.coarse_level()), options);
+      allocate_slots(allocation_request(demand, residents, table.capacity(), layout.coarse_level(), images), options);
   grant_available(demand, layout.coarse_level(), table, images, options);
   demand.requests = requests_of(set, layout, demand);
   return demand;
@@ -107,7 +111,7 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
     return;
   }
   const auto residents = table.residents();
-  auto request = allocation_request(demand, residents, table.capacity(), coarse_level);
+  auto request = allocation_request(demand, residents, table.capacity(), coarse_level, images);
   request.available = [&](TileId t) { return has_image(images, t); };
   demand.granted = allocate_slots(request, options);
 }
