@@ -258,17 +258,20 @@ Allocation allocate_slots(const AllocationRequest& request, const AllocationOpti
   const Problem problem(request, options);
   if (auto all = problem.finest(); all.size() <= request.slots) return problem.result(std::move(all));
   // Greedy picks near the cut-off depend on small changes of weight. What is there stays unless that costs something.
-  const double enough = 1.0 - double(options.least_improvement);
+  const double most = problem.upper_bound();
   Allocation stay;
   if (auto kept = problem.useful_residents(); !kept.empty() && kept.size() <= request.slots) {
     problem.fill(kept, false);
     stay = problem.result(std::move(kept));
-    if (stay.benefit >= enough * problem.upper_bound()) return stay;
+    if (most - stay.benefit <= double(options.negligible) * most) return stay;
   }
   std::vector<std::uint32_t> fresh;
   problem.fill(fresh, true);
   auto best = problem.result(std::move(fresh));
-  return !stay.tiles.empty() && stay.benefit >= enough * best.benefit ? stay : best;
+  const double lost = std::max(0.0, most - best.benefit);
+  const double spared = best.benefit - stay.benefit;
+  const double enough = std::max(double(options.least_improvement) * lost, double(options.negligible) * most);
+  return !stay.tiles.empty() && spared <= enough ? stay : best;
 }
 
 }  // namespace darm::tile_scheduler

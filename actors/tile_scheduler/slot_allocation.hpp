@@ -17,7 +17,8 @@ struct AllocationOptions {
   float loss_per_further_level = 1.4f;  ///< for CoarseTex, when it is more than three levels coarser
   float coarse_penalty = 0.5f;          ///< CoarseTex is also the least well lit: it loses this much more
   float resident_bonus = 0.15f;         ///< a resident tile's gain counts for this much more
-  float least_improvement = 0.01f;      ///< residents stay if that costs at most this share of the total benefit
+  float least_improvement = 0.05f;      ///< residents stay if moving lessens what is lost by at most this share of it
+  float negligible = 1e-4f;             ///< or by at most this share of the benefit that slots without limit would have
 };
 
 struct AllocationRequest {
