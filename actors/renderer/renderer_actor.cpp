@@ -167,7 +167,8 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
   const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces);
   const float least = result.shading.progress.least;
   if (facts && result.shading.progress.mean > 0 && least < kCountWithoutFilter)
-    facts->learn_albedo(*surface, job.mask, least < 2 ? 1 : least < 8 ? 4 : 8);
+    // Stored light is shown before anything else is done: there a rough albedo must do until the tile is shaded again.
+    facts->learn_albedo(*surface, job.mask, least < 2 ? 1 : result.shading.samples == 0 ? 2 : least < 8 ? 4 : 8);
 }
 
 void RendererActor::learn_cost(double seconds, std::uint64_t samples) {
