@@ -26,6 +26,8 @@ class CoarseRounds {
   CoarseRounds(int level, LevelTiles tiles, std::uint32_t rounds) : level_(level), tiles_(tiles), rounds_(rounds) {}
 
   [[nodiscard]] bool finished() const { return round_ > rounds_ || rounds_ == 0; }
+  /// Before the first picture: until a client has it, nothing else can be shown.
+  [[nodiscard]] bool opening() const { return round_ == 0 && !finished(); }
   [[nodiscard]] bool first_pass_done() const { return round_ > 1 || finished(); }
   [[nodiscard]] int level() const { return level_; }
   [[nodiscard]] const LevelTiles& tiles() const { return tiles_; }

@@ -74,6 +74,7 @@ void RendererActor::on(SliceFinished&& message) {
 std::vector<TileJob> RendererActor::choose_jobs() {
   const auto& options = shared_->parts.options;
   const double budget = std::max(64.0, double{options.batch_ms} * 1000.0 * executor().workers() / sample_us_);
+  if (coarse_.opening()) return coarse_.next_batch(static_cast<std::uint64_t>(budget));
   const double share = coarse_.finished()          ? 0.0
                        : coarse_.first_pass_done() ? double{options.coarse_share}
                                                    : double{options.coarse_first_share};
