@@ -23,9 +23,10 @@ struct Common {
     app.add_option("--config", config_files, "TOML file; may be given several times, a later one overrides");
     app.add_option(scene_is_positional ? "scene,--scene" : "--scene", scene, "glTF or GLB file to load");
     app.add_option("--state-dir", state_dir, "folder of caches and radiance store");
-    app.add_option("--q", q, "texels per metre of level 0 (0: automatic)");
-    app.add_option("--exposure", exposure, "display = sRGB(clamp(exposure * nits)) (0: automatic)");
-    app.add_option("--threads", threads, "threads for long work (0: one per core)");
+    app.add_option("--q", q, "texels per metre of level 0 (0: automatic)")->check(CLI::Range(0.0, 65536.0));
+    app.add_option("--exposure", exposure, "display = sRGB(clamp(exposure * nits)) (0: automatic)")
+        ->check(CLI::Range(0.0, 1e12));
+    app.add_option("--threads", threads, "threads for long work (0: one per core)")->check(CLI::Range(0, 1024));
   }
 };
 
@@ -91,12 +92,26 @@ const CLI::Validator kSize(
     },
     "WxH");
 
+const CLI::Range kPort(0, 65535);
+
+/// Where pictures go: refused before the work, not after.
+const CLI::Validator kPngPath(
+    [](std::string& text) {
+      const std::filesystem::path path(text);
+      const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+      if (path.extension() != ".png") return "'" + text + "' does not end in .png";
+      return std::filesystem::is_directory(folder) ? std::string() : "folder " + folder.string() + " does not exist";
+    },
+    "FILE.png");
+
 void add_serve(CLI::App& app, ServeOptions& options) {
   options.common.add_to(app, false);
-  app.add_option("--tcp-port", options.tcp_port, "clients connect here (0: any free port)");
-  app.add_option("--udp-port", options.udp_port, "cameras arrive here (0: any free port)");
-  app.add_option("--http-port", options.http_port, "reserved for the web client (0: off)");
-  app.add_option("--metrics-port", options.metrics_port, "Prometheus (0: any free port, -1: off)");
+  app.add_option("--tcp-port", options.tcp_port, "clients connect here (0: any free port)")->check(kPort);
+  app.add_option("--udp-port", options.udp_port, "cameras arrive here (0: any free port)")->check(kPort);
+  app.add_option("--http-port", options.http_port, "reserved for the web client: only 0 (off)")
+      ->check(CLI::Range(0, 0));
+  app.add_option("--metrics-port", options.metrics_port, "Prometheus (0: any free port, -1: off)")
+      ->check(CLI::Range(-1, 65535));
   app.add_option("--address", options.address, "address to listen on");
   app.add_flag("--allow-lossless", options.allow_lossless, "let clients ask for uncompressed tiles (evaluation)");
   app.add_option("--seed", options.seed, "seed of the light's sample sequences");
@@ -121,7 +136,8 @@ void add_render(CLI::App& app, RenderCommand& command, Common& common, std::stri
   app.add_option("--effects", effects, "full or view-independent")->check(CLI::IsMember({"full", "view-independent"}));
   app.add_option("--seed", command.seed, "seed of the sample sequences");
   app.add_option("--out", command.out, "picture (.png); .pfm, .a.pfm, .b.pfm (halves) and .json are written beside it")
-      ->required();
+      ->required()
+      ->check(kPngPath);
   app.add_flag("--json", command.json, "machine-readable report");
   app.callback([spp, psnr] {
     if (spp->empty() && psnr->empty()) throw CLI::RequiredError("--spp N or --until-psnr P");

@@ -38,4 +38,4 @@ The daemon prints a ready line with its addresses once clients can connect; stop
 
 A camera is a name from config/scenes/default.toml or "px,py,pz tx,ty,tz fovy". Metrics: http://127.0.0.1:9090/metrics
 TEXT
-exec build/release/bin/darmd serve --config config/scenes/default.toml --state-dir state "${serve[@]}"
+exec build/release/bin/darmd serve --config config/scenes/default.toml "${serve[@]}"

@@ -50,11 +50,11 @@ std::string percent_decoded(std::string_view text) {
 
 std::optional<std::vector<std::uint8_t>> base64_decoded(std::string_view text) {
   static const auto table = [] {
-    std::array<std::int8_t, 256> t{};
+    std::array<std::int16_t, 256> t{};
     t.fill(-1);
     constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for (std::size_t i = 0; i < alphabet.size(); ++i)
-      t[static_cast<unsigned char>(alphabet[i])] = static_cast<std::int8_t>(i);
+      t[static_cast<unsigned char>(alphabet[i])] = static_cast<std::int16_t>(i);
     return t;
   }();
   while (!text.empty() && text.back() == '=') text.remove_suffix(1);

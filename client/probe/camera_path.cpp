@@ -1,7 +1,6 @@
 #include "client/probe/camera_path.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +9,16 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
+
+// toml++ 3.3 takes some malformed keys as failed assertions, and in release builds as undefined behaviour (found by
+// fuzzing). Here they are errors like any other.
+#undef NDEBUG
+namespace {
+[[noreturn]] void malformed_toml() { throw std::runtime_error("malformed"); }
+}  // namespace
+#define TOML_ASSERT(condition) (static_cast<bool>(condition) ? static_cast<void>(0) : malformed_toml())
+#include <toml++/toml.h>
 
 namespace darm::client::probe {
 namespace {
@@ -66,6 +75,8 @@ Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::pa
     table = toml::parse_file(setup.string());
   } catch (const toml::parse_error& e) {
     return fail(setup.string() + ": " + std::string(e.description()));
+  } catch (const std::runtime_error& e) {
+    return fail(setup.string() + ": " + e.what());
   }
   std::string known;
   if (const auto* cameras = table["cameras"].as_array()) {

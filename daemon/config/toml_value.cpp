@@ -1,6 +1,16 @@
 #include "daemon/config/toml_value.hpp"
 
 #include <fmt/format.h>
+
+#include <stdexcept>
+
+// toml++ 3.3 takes some malformed keys as failed assertions, and in release builds as undefined behaviour (found by
+// fuzzing). Here they are errors like any other.
+#undef NDEBUG
+namespace {
+[[noreturn]] void malformed_toml() { throw std::runtime_error("malformed"); }
+}  // namespace
+#define TOML_ASSERT(condition) (static_cast<bool>(condition) ? static_cast<void>(0) : malformed_toml())
 #include <toml++/toml.h>
 
 namespace darm::config {
@@ -63,11 +73,44 @@ std::string TomlValue::shown() const {
   return '"' + text + (s->size() > 60 ? "...\"" : "\"");
 }
 
+// Line of the first non-ASCII byte outside quotes and comments; 0: none. TOML allows none there, and toml++ 3.3 runs
+// into undefined behaviour on some of them (found by fuzzing). Quotes are taken to end with their line.
+static int line_of_bare_non_ascii(std::string_view text) {
+  int line = 1;
+  char inside = 0;  // '"', '\'' or '#'; 0: none
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '\n') {
+      ++line;
+      inside = 0;
+    } else if (inside == '"' && c == '\\') {
+      ++i;
+      if (i < text.size() && text[i] == '\n') {
+        ++line;
+        inside = 0;
+      }
+    } else if (inside == 0 && (c == '"' || c == '\'' || c == '#')) {
+      inside = c;
+    } else if (inside == c && c != '#') {
+      inside = 0;
+    } else if (inside == 0 && static_cast<unsigned char>(c) >= 0x80) {
+      return line;
+    }
+  }
+  return 0;
+}
+
 std::expected<TomlValue, TomlSyntaxError> parse_toml(std::string_view text) {
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // byte-order mark
+  if (const int line = line_of_bare_non_ascii(text); line > 0) {
+    return std::unexpected(TomlSyntaxError{line, "a character that is not ASCII outside quotes and comments"});
+  }
   try {
     return convert(toml::parse(text));
   } catch (const toml::parse_error& e) {
     return std::unexpected(TomlSyntaxError{static_cast<int>(e.source().begin.line), std::string(e.description())});
+  } catch (const std::runtime_error& e) {
+    return std::unexpected(TomlSyntaxError{0, e.what()});
   }
 }
 
