@@ -22,13 +22,12 @@ namespace darm::atlas {
 namespace {
 
 constexpr std::uint64_t kPage = 4096;
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kClean = 0x434c4541;
 constexpr std::uint32_t kBeingWritten = 0x44495254;
 constexpr std::array<char, 8> kMagic{'D', 'A', 'R', 'M', 'R', 'A', 'D', '\n'};
 constexpr std::uint64_t kMaxTiles = std::uint64_t{1} << 28;
-constexpr std::size_t kPlaneBytes = sizeof(float) * kTileTexels * kPlanes;
-constexpr std::uint64_t kBlocksPerReserve = 32;  // 1.1 MiB: one system call a second even while everything is new
+constexpr std::uint64_t kBlocksPerReserve = 32;  // 1.5 MiB: one system call a second even while everything is new
 constexpr double kBrightest = 1e15;
 
 struct FileHeader {
@@ -91,12 +90,26 @@ struct RadianceStore::BlockHeader {
   std::uint32_t tile;
   std::uint32_t version;
   std::uint32_t unused[11];
-  float planes[kPlanes * kTileTexels];
+  struct Content {
+    float planes[kPlanes * kTileTexels];
+    TileAlbedo albedo;
+  } content;
+  static_assert(std::has_unique_object_representations_v<TileAlbedo> && std::is_trivially_copyable_v<Content>);
+
+  struct Picture {
+    std::uint64_t check_sum;
+    std::uint64_t tag;  // 0: none
+    StoredPicture content;
+
+    [[nodiscard]] std::uint64_t sum_now() const { return XXH3_64bits_withSeed(&content, sizeof content, tag); }
+  } picture;
+  static_assert(std::is_trivially_copyable_v<StoredPicture>);
 
   [[nodiscard]] std::uint64_t sum_now() const {
     const std::uint64_t seed = (std::uint64_t{tile} << 32 | version) ^ 0x6461726d;
-    return XXH3_64bits_withSeed(planes, kPlaneBytes, seed);
+    return XXH3_64bits_withSeed(&content, sizeof content, seed);
   }
+  [[nodiscard]] TileView view() const { return {content.planes, &content.albedo}; }
 };
 
 std::string RadianceStore::file_name(const StoreKey& key) {
@@ -276,19 +289,43 @@ RadianceStore::Trust RadianceStore::trust_of(std::uint32_t block_index, TileId t
   if (known != Trust::kUnknown) return known;
   const BlockHeader* b = block(block_index);
   bool good = b->state == kClean && b->tile == tile.packed && b->check_sum == b->sum_now();
-  for (int i = 0; good && i < kPlanes * kTileTexels; ++i) good = std::isfinite(b->planes[i]);
+  for (int i = 0; good && i < kPlanes * kTileTexels; ++i) good = std::isfinite(b->content.planes[i]);
   Trust expected = Trust::kUnknown;
   const Trust verdict = good ? Trust::kGood : Trust::kTorn;
   if (trust.compare_exchange_strong(expected, verdict, std::memory_order_acq_rel) && !good) ++torn_;
   return good ? Trust::kGood : Trust::kTorn;
 }
 
-std::optional<TileView> RadianceStore::read(TileId tile) const {
+RadianceStore::BlockHeader* RadianceStore::trusted_block(TileId tile) const {
   const auto slot = slot_of(tile);
-  if (!slot) return std::nullopt;
+  if (!slot) return nullptr;
   const std::uint32_t e = entry(*slot).load(std::memory_order_acquire);
-  if (e == 0 || trust_of(e - 1, tile) != Trust::kGood) return std::nullopt;
-  return TileView(block(e - 1)->planes);
+  return e != 0 && trust_of(e - 1, tile) == Trust::kGood ? block(e - 1) : nullptr;
+}
+
+std::optional<TileView> RadianceStore::read(TileId tile) const {
+  const BlockHeader* b = trusted_block(tile);
+  return b != nullptr ? std::optional(b->view()) : std::nullopt;
+}
+
+void RadianceStore::put_picture(TileId tile, std::uint64_t tag, const StoredPicture& picture) {
+  BlockHeader* b = trusted_block(tile);
+  if (b == nullptr || tag == 0) return;
+  std::atomic_ref(b->picture.tag).store(0, std::memory_order_relaxed);
+  std::atomic_thread_fence(std::memory_order_seq_cst);  // as in begin_update
+  b->picture.content = picture;
+  b->picture.check_sum = XXH3_64bits_withSeed(&picture, sizeof picture, tag);
+  std::atomic_thread_fence(std::memory_order_seq_cst);
+  std::atomic_ref(b->picture.tag).store(tag, std::memory_order_release);
+}
+
+std::optional<StoredPicture> RadianceStore::picture(TileId tile, std::uint64_t tag) const {
+  const BlockHeader* b = trusted_block(tile);
+  if (b == nullptr || tag == 0 || b->picture.tag != tag || b->picture.check_sum != b->picture.sum_now())
+    return std::nullopt;
+  const auto& p = b->picture.content;
+  if (!std::isfinite(p.error) || !std::isfinite(p.samples)) return std::nullopt;
+  return p;
 }
 
 bool RadianceStore::has(TileId tile) const {
@@ -297,11 +334,8 @@ bool RadianceStore::has(TileId tile) const {
 }
 
 std::uint32_t RadianceStore::version(TileId tile) const {
-  const auto slot = slot_of(tile);
-  if (!slot) return 0;
-  const std::uint32_t e = entry(*slot).load(std::memory_order_acquire);
-  if (e == 0 || trust_of(e - 1, tile) != Trust::kGood) return 0;
-  return block(e - 1)->version;
+  const BlockHeader* b = trusted_block(tile);
+  return b != nullptr ? b->version : 0;
 }
 
 Result<std::uint32_t> RadianceStore::allocate_block() {
@@ -345,7 +379,8 @@ Result<RadianceStore::Update> RadianceStore::begin_update(TileId tile) {
   // compiler (and other processors) from moving the writes of the light above the mark.
   std::atomic_thread_fence(std::memory_order_seq_cst);
   if (empty) {
-    std::memset(b->planes, 0, kPlaneBytes);
+    std::memset(static_cast<void*>(&b->content), 0, sizeof b->content);
+    b->picture.tag = 0;
     b->tile = tile.packed;
     b->version = 0;
     trust_[e - 1].store(Trust::kGood, std::memory_order_release);
@@ -354,11 +389,13 @@ Result<RadianceStore::Update> RadianceStore::begin_update(TileId tile) {
   return Update(this, e - 1);
 }
 
-TileView RadianceStore::Update::view() const { return TileView(store_->block(block_)->planes); }
+TileView RadianceStore::Update::view() const { return store_->block(block_)->view(); }
+
+void RadianceStore::Update::put_albedo(const TileAlbedo& albedo) { store_->block(block_)->content.albedo = albedo; }
 
 void RadianceStore::Update::merge(int texel, Layer layer, const TexelBatch& batch) {
   if (batch.count == 0 || texel < 0 || texel >= kTileTexels) return;
-  float* p = store_->block(block_)->planes + static_cast<int>(layer) * kTileTexels + texel;
+  float* p = store_->block(block_)->content.planes + static_cast<int>(layer) * kTileTexels + texel;
   const double before = p[3 * kTileTexels];
   const double added = batch.count;
   const double all = before + added;  // > 0

@@ -50,11 +50,30 @@ struct TexelBatch {
   [[nodiscard]] bool add(const glm::vec3& radiance);
 };
 
+/// What reflected light is multiplied with, texel by texel, as far as it is known: stored beside the light, because the
+/// filter divides by it, and computing it again costs more than reading the light.
+struct TileAlbedo {
+  std::array<std::array<std::uint16_t, 3>, kTileTexels> bits{};  ///< 65535 is 1
+  std::array<std::uint8_t, kTileTexels> points{};                ///< of the surface, behind the mean; 0: not known
+  bool operator==(const TileAlbedo&) const = default;
+};
+
+/// The newest picture of a tile (TileImage), kept so that a restart shows it without drawing it again.
+struct StoredPicture {
+  std::array<std::uint8_t, kSlotTexels * 3> rgb{};
+  std::array<std::uint8_t, kSlotTexels> coverage{};
+  std::uint32_t covered = 0;  ///< 1: `coverage` counts; 0: opaque
+  float error = 0;            ///< as it was estimated, 0..1
+  float samples = 0;          ///< mean per seen texel
+  bool operator==(const StoredPicture&) const = default;
+};
+
 /// Read access to one tile. Valid while the store lives; contents are stable while nobody updates the tile.
 class TileView {
  public:
   TileView() = default;
-  explicit TileView(const float* planes) : planes_(planes) {}
+  TileView(const float* planes, const TileAlbedo* albedo) : planes_(planes), albedo_(albedo) {}
+  [[nodiscard]] const TileAlbedo& albedo() const { return *albedo_; }
   [[nodiscard]] const float* plane(Plane p) const { return planes_ + static_cast<int>(p) * kTileTexels; }
   [[nodiscard]] glm::vec3 mean(Layer layer, int texel) const {
     const float* p = planes_ + static_cast<int>(layer) * kTileTexels + texel;
@@ -72,6 +91,7 @@ class TileView {
 
  private:
   const float* planes_ = nullptr;
+  const TileAlbedo* albedo_ = nullptr;
 };
 
 /// What the light in a store depends on. A store with another key is another file.
@@ -83,7 +103,7 @@ struct StoreKey {
 
 struct StoreOptions {
   std::uint64_t max_bytes = std::uint64_t{16}
-                            << 30;  ///< of the file; a tile takes 36 KiB. New tiles are refused beyond it
+                            << 30;  ///< of the file; a tile takes 48 KiB. New tiles are refused beyond it
 };
 
 struct StoreCounters {
@@ -115,6 +135,7 @@ class RadianceStore {
     /// Merges a batch into a texel's running mean and second moment (Chan, Golub, LeVeque 1979, eq. 2.1; pairs of any
     /// order give the same up to rounding). Refuses nothing: batches hold only finite samples.
     void merge(int texel, Layer layer, const TexelBatch& batch);
+    void put_albedo(const TileAlbedo& albedo);
     [[nodiscard]] TileView view() const;
 
    private:
@@ -146,6 +167,13 @@ class RadianceStore {
   /// Number of updates the tile has seen; 0: nothing stored. Grows over restarts.
   [[nodiscard]] std::uint32_t version(TileId tile) const;
 
+  /// Keeps a picture beside the tile's light; does nothing if the tile has none. `tag` (not 0) names all that a picture
+  /// depends on beside light: one written under another tag is not found. Has a check sum of its own, so that writing
+  /// it puts no light at risk. One thread per tile, but the light may be read meanwhile.
+  void put_picture(TileId tile, std::uint64_t tag, const StoredPicture& picture);
+  /// nullopt: none, or torn, or of another tag, or of a tile that is refused.
+  [[nodiscard]] std::optional<StoredPicture> picture(TileId tile, std::uint64_t tag) const;
+
   /// Opens a tile for writing; a new or torn one starts empty. Fails (counted) when the size limit or the disk is full.
   [[nodiscard]] Result<Update> begin_update(TileId tile);
 
@@ -153,8 +181,8 @@ class RadianceStore {
   [[nodiscard]] const std::string& refused_reason() const { return refused_reason_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Bytes of one block: header and planes, whole pages.
-  static constexpr std::size_t kBlockBytes = 9 * 4096;
+  /// Bytes of one block: header, planes, albedo and picture, whole pages.
+  static constexpr std::size_t kBlockBytes = 12 * 4096;
 
  private:
   struct BlockHeader;
@@ -169,6 +197,8 @@ class RadianceStore {
   [[nodiscard]] std::optional<std::uint64_t> slot_of(TileId tile) const;
   [[nodiscard]] std::atomic_ref<std::uint32_t> entry(std::uint64_t slot) const;
   [[nodiscard]] BlockHeader* block(std::uint32_t index) const;
+  /// Null if the tile has no light that can be trusted.
+  [[nodiscard]] BlockHeader* trusted_block(TileId tile) const;
   [[nodiscard]] Trust trust_of(std::uint32_t block_index, TileId tile) const;
   [[nodiscard]] Result<std::uint32_t> allocate_block();
 

@@ -1,6 +1,7 @@
 // The coarsest level as a whole: what a new client sees first, shaded in rounds beside the working set.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -34,6 +35,8 @@ class CoarseRounds {
 
   /// Jobs worth about `samples` from the current round, which ends with the last of its tiles.
   [[nodiscard]] std::vector<TileJob> next_batch(std::uint64_t samples);
+  /// Every texel has `samples` already: the rounds up to that are over. Call before the first batch.
+  void resume(std::uint32_t samples) { round_ = std::min(samples, rounds_) + 1; }
   /// Call when all jobs handed out are done. True if a picture is due now.
   bool batch_finished();
 

@@ -1,10 +1,13 @@
 #include "actors/renderer/renderer_actor.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <exception>
+#include <limits>
 #include <utility>
 
+#include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/texel_shading.hpp"
 
 namespace darm::renderer {
@@ -12,7 +15,34 @@ namespace darm::renderer {
 namespace {
 
 constexpr std::size_t kPicturesPerSlice = 24;
+/// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
+constexpr std::uint64_t kDisplayVersion = 1;
 constexpr float kCountWithoutFilter = 512;  // texels of more samples need no albedo: they are never filtered
+
+// What a stored picture depends on beside its light.
+std::uint64_t picture_tag_of(const DisplayOptions& display) {
+  const std::uint64_t options = std::uint64_t{std::bit_cast<std::uint32_t>(display.exposure)} << 32 |
+                                std::bit_cast<std::uint32_t>(display.filter_samples);
+  return (options * 0x9e3779b97f4a7c15ull ^ kDisplayVersion) | 1;
+}
+
+atlas::StoredPicture to_stored(const TilePicture& picture) {
+  atlas::StoredPicture out;
+  out.rgb = picture.image->rgb;
+  if (picture.image->coverage) out.coverage = *picture.image->coverage;
+  out.covered = picture.image->coverage ? 1 : 0;
+  out.error = picture.error;
+  out.samples = picture.samples;
+  return out;
+}
+
+TilePicture from_stored(const atlas::StoredPicture& stored) {
+  auto image = std::make_shared<TileImage>();
+  image->rgb = stored.rgb;
+  convert_to_planes(*image);
+  if (stored.covered != 0) image->coverage = std::make_shared<const CoverageTile>(stored.coverage);
+  return {std::move(image), stored.error, stored.samples};
+}
 
 }  // namespace
 
@@ -20,6 +50,7 @@ struct RendererActor::Shared {
   explicit Shared(RendererParts p) : parts(std::move(p)) {}
   RendererParts parts;
   TileFactsCache facts;
+  std::uint64_t picture_tag = picture_tag_of(parts.options.display);
 
   [[nodiscard]] runtime::MetricSink& metrics() const {
     return parts.metrics != nullptr ? *parts.metrics : runtime::null_metrics();
@@ -51,7 +82,28 @@ RendererActor::RendererActor(runtime::Context<Inbox> context, RendererParts part
               shared_->parts.levels.empty() ? LevelTiles{} : shared_->parts.levels.back(),
               shared_->parts.levels.empty() ? 0 : shared_->parts.options.coarse_rounds) {}
 
-void RendererActor::on_start() { begin_batch(); }
+void RendererActor::on_start() {
+  resume_coarse();
+  begin_batch();
+}
+
+// After a restart the coarse level is as far as its least lit tile was, and its stored pictures are shown at once.
+void RendererActor::resume_coarse() {
+  const auto& tiles = coarse_.tiles();
+  if (coarse_.finished() || tiles.x == 0) return;
+  float least = std::numeric_limits<float>::infinity();
+  for (std::uint32_t t = 0; t < tiles.x * tiles.y; ++t) {
+    const auto stored = shared_->parts.store->picture(TileId(coarse_.level(), t), shared_->picture_tag);
+    if (!stored) return;
+    least = std::min(least, stored->samples);
+  }
+  if (least < 1) return;
+  coarse_.resume(static_cast<std::uint32_t>(least));
+  if (!shared_->parts.coarse) return;
+  auto batch = std::make_shared<Batch>();
+  add_coarse_pictures(*batch, true);
+  draw(batch);
+}
 
 void RendererActor::on(ShadeTiles&& message) {
   waiting_ = std::move(message);
@@ -95,12 +147,28 @@ std::vector<TileJob> RendererActor::choose_jobs() {
   return jobs;
 }
 
+// What was shown before, here or before a restart, is shown again before anything is computed.
+bool RendererActor::begin_recall() {
+  auto batch = std::make_shared<Batch>();
+  for (const TileId tile : schedule_.recalls_due()) {
+    TileJob job;
+    job.tile = tile;
+    job.recall = true;
+    batch->jobs.push_back(job);
+  }
+  if (batch->jobs.empty()) return false;
+  draw(batch);
+  return true;
+}
+
 void RendererActor::begin_batch() {
+  if (phase_ == Phase::kPictures && slices_left_ > 0) return;
   if (waiting_) {
     static const std::vector<TileRequest> kNothing;
     schedule_.replace(waiting_->work ? *waiting_->work : kNothing,
                       [this](TileId tile) { return shared_->parts.store->has(tile); });
     waiting_.reset();
+    if (begin_recall()) return;
   }
   auto batch = std::make_shared<Batch>();
   batch->jobs = choose_jobs();
@@ -165,11 +233,12 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
     result.shading = *shaded;
   }
   const LevelTiles level = shared.level_of(job.tile);
-  const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces);
+  const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces, *shared.parts.store);
   const float least = result.shading.progress.least;
-  if (facts && result.shading.progress.mean > 0 && least < kCountWithoutFilter)
-    // Stored light is shown before anything else is done: there a rough albedo must do until the tile is shaded again.
-    facts->learn_albedo(*surface, job.mask, least < 2 ? 1 : result.shading.samples == 0 ? 2 : least < 8 ? 4 : 8);
+  if (!facts || result.shading.progress.mean <= 0 || least >= kCountWithoutFilter) return;
+  if (!facts->learn_albedo(*surface, job.mask, least < 2 || result.shading.samples == 0 ? 1 : least < 8 ? 4 : 8))
+    return;
+  if (auto update = shared.parts.store->begin_update(job.tile)) update->put_albedo(facts->albedo_means);
 }
 
 void RendererActor::learn_cost(double seconds, std::uint64_t samples) {
@@ -220,16 +289,7 @@ void RendererActor::begin_pictures() {
     job.mask = *schedule_.mask_of(tile);
     next->jobs.push_back(job);
   }
-  if (coarse_due_ && shared_->parts.coarse) {
-    next->canvas = std::make_shared<CoarseCanvas>(coarse_.tiles(), ++coarse_number_);
-    for (std::uint32_t t = 0; t < coarse_.tiles().x * coarse_.tiles().y; ++t) {
-      TileJob job;
-      job.tile = TileId(coarse_.level(), t);
-      job.mask = TexelMask::all();
-      job.coarse = true;
-      next->jobs.push_back(job);
-    }
-  }
+  if (coarse_due_ && shared_->parts.coarse) add_coarse_pictures(*next, false);
   coarse_due_ = false;
   if (next->jobs.empty()) {
     const bool worked = !batch_->jobs.empty();
@@ -237,16 +297,40 @@ void RendererActor::begin_pictures() {
     if (worked || waiting_) begin_batch();
     return;
   }
+  draw(next);
+}
+
+void RendererActor::add_coarse_pictures(Batch& batch, bool recall) {
+  batch.canvas = std::make_shared<CoarseCanvas>(coarse_.tiles(), ++coarse_number_);
+  for (std::uint32_t t = 0; t < coarse_.tiles().x * coarse_.tiles().y; ++t) {
+    TileJob job;
+    job.tile = TileId(coarse_.level(), t);
+    job.mask = TexelMask::all();
+    job.coarse = true;
+    job.recall = recall;
+    job.keep = !schedule_.has(job.tile);  // one writer
+    batch.jobs.push_back(job);
+  }
+}
+
+void RendererActor::draw(const std::shared_ptr<Batch>& batch) {
   phase_ = Phase::kPictures;
   std::vector<std::size_t> starts;
-  for (std::size_t i = 0; i < next->jobs.size(); i += kPicturesPerSlice) starts.push_back(i);
-  post_slices(next, std::move(starts), &RendererActor::picture_one);
+  for (std::size_t i = 0; i < batch->jobs.size(); i += kPicturesPerSlice) starts.push_back(i);
+  post_slices(batch, std::move(starts), &RendererActor::picture_one);
 }
 
 void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index) {
   const TileJob& job = batch.jobs[index];
-  TileDisplay display(*shared.parts.store, shared.facts, shared.parts.options.display);
-  auto picture = display.draw(job.tile, shared.level_of(job.tile), job.mask);
+  auto& store = *shared.parts.store;
+  std::optional<TilePicture> picture;
+  if (job.recall) {
+    if (const auto stored = store.picture(job.tile, shared.picture_tag)) picture = from_stored(*stored);
+  } else {
+    TileDisplay display(store, shared.facts, shared.parts.options.display);
+    picture = display.draw(job.tile, shared.level_of(job.tile), job.mask);
+    if (picture && job.keep) store.put_picture(job.tile, shared.picture_tag, to_stored(*picture));
+  }
   if (job.coarse) {
     if (picture) batch.canvas->put(job.tile.index(), *picture->image);
   } else {
@@ -260,7 +344,10 @@ void RendererActor::finish_pictures() {
     const TileJob& job = batch_->jobs[i];
     JobResult& r = batch_->results[i];
     if (job.coarse) continue;
-    schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f);
+    if (!job.recall)
+      schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f);
+    else if (r.picture)
+      schedule_.recalled(job.tile, r.picture->error, r.picture->samples);
     if (!r.picture) continue;
     tile_scheduler::ShadedTile shaded;
     shaded.tile = job.tile;

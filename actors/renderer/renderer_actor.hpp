@@ -57,8 +57,12 @@ class RendererActor : public runtime::Actor<Inbox> {
   struct Batch;  // one phase's work and results
 
   void begin_batch();
+  [[nodiscard]] bool begin_recall();
+  void resume_coarse();
   void finish_shading();
   void begin_pictures();
+  void add_coarse_pictures(Batch& batch, bool recall);
+  void draw(const std::shared_ptr<Batch>& batch);
   void finish_pictures();
   void post_slices(const std::shared_ptr<Batch>& batch, std::vector<std::size_t> starts,
                    void (*work)(Shared&, Batch&, std::size_t));

@@ -69,8 +69,7 @@ void TileDisplay::gather(int radius) {
       const int texel = row.texel * kTileSize + column.texel;
       if (!from.facts) continue;
       window_.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
-      if (!from.light || from.facts->points[static_cast<std::size_t>(texel)] == 0 || window_.patch[at] == kNobody)
-        continue;
+      if (!from.light || !from.facts->knows_albedo(texel) || window_.patch[at] == kNobody) continue;
       const float n = from.light->count(Layer::kSoft, texel);
       const glm::vec3 albedo = from.facts->albedo(texel);
       const float grey = grey_of(albedo);

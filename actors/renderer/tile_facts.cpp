@@ -8,8 +8,10 @@
 
 namespace darm::renderer {
 
-void TileFacts::learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points) {
+bool TileFacts::learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points) {
   const int goal = std::min(wanted_points, 255);
+  auto& points = albedo_means.points;
+  bool learned = false;
   for (int texel = 0; texel < kTileTexels; ++texel) {
     const auto at = static_cast<std::size_t>(texel);
     if (!wanted.test(texel) || points[at] >= goal) continue;
@@ -19,10 +21,12 @@ void TileFacts::learn_albedo(const TileSurface& surface, const TexelMask& wanted
     const glm::vec3 mean = sum / static_cast<float>(goal);
     for (int c = 0; c < 3; ++c) {
       const float a = mean[c] > 0.0f ? std::min(mean[c], 1.0f) : 0.0f;  // NaN becomes 0: not filtered
-      albedo_bits[at][static_cast<std::size_t>(c)] = static_cast<std::uint16_t>(std::lround(a * 65535.0f));
+      albedo_means.bits[at][static_cast<std::size_t>(c)] = static_cast<std::uint16_t>(std::lround(a * 65535.0f));
     }
     points[at] = static_cast<std::uint8_t>(goal);
+    learned = true;
   }
+  return learned;
 }
 
 std::shared_ptr<const CoverageTile> cover_tile(TileId id, const LevelTiles& level, const TileSurfaces& surfaces,
@@ -66,7 +70,8 @@ std::shared_ptr<const CoverageTile> cover_tile(TileId id, const LevelTiles& leve
   return coverage;
 }
 
-std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces) {
+std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces,
+                                               const atlas::RadianceStore& store) {
   {
     const std::scoped_lock lock(mutex_);
     if (const auto it = entries_.find(id); it != entries_.end()) {
@@ -79,6 +84,7 @@ std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const LevelTiles& leve
   auto facts = std::make_shared<TileFacts>();
   for (int t = 0; t < kTileTexels; ++t) facts->patch[static_cast<std::size_t>(t)] = surface->patch(t);
   facts->coverage = cover_tile(id, level, surfaces);
+  if (const auto stored = store.read(id)) facts->albedo_means = stored->albedo();
 
   const std::scoped_lock lock(mutex_);
   if (const auto it = entries_.find(id); it != entries_.end()) return it->second.facts;

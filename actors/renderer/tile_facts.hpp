@@ -9,6 +9,7 @@
 #include <mutex>
 #include <unordered_map>
 
+#include "actors/atlas/radiance_store.hpp"
 #include "actors/renderer/tile_surface.hpp"
 #include "actors/types/texel_mask.hpp"
 #include "actors/types/tile_image.hpp"
@@ -18,17 +19,17 @@ namespace darm::renderer {
 /// About 10 KB a tile. Albedo is averaged over a few points of each texel, only where somebody has shaded.
 struct TileFacts {
   std::array<std::uint32_t, kTileTexels> patch{};
-  std::array<std::array<std::uint16_t, 3>, kTileTexels> albedo_bits{};  ///< 65535 is 1
-  std::array<std::uint8_t, kTileTexels> points{};                       ///< of each texel's albedo mean; 0: not known
-  std::shared_ptr<const CoverageTile> coverage;                         ///< null: opaque
+  atlas::TileAlbedo albedo_means;
+  std::shared_ptr<const CoverageTile> coverage;  ///< null: opaque
 
+  [[nodiscard]] bool knows_albedo(int texel) const { return albedo_means.points[static_cast<std::size_t>(texel)] > 0; }
   [[nodiscard]] glm::vec3 albedo(int texel) const {
-    const auto& a = albedo_bits[static_cast<std::size_t>(texel)];
+    const auto& a = albedo_means.bits[static_cast<std::size_t>(texel)];
     return glm::vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f);
   }
   /// Brings the albedo of each texel of `wanted` to a mean of `wanted_points` points: few at first, so that the first
-  /// picture comes soon, more when light is exact enough to show the difference.
-  void learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points = 4);
+  /// picture comes soon, more when light is exact enough to show the difference. True if something was learned.
+  bool learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points = 4);
 };
 
 /// Mean alpha of the slot's 32x32 texels, border from the neighbour tiles; null if all of it is opaque.
@@ -41,8 +42,10 @@ class TileFactsCache {
  public:
   explicit TileFactsCache(std::size_t max_tiles = 16384) : max_tiles_(max_tiles < 16 ? 16 : max_tiles) {}
 
-  /// The tile's facts, made (patches and coverage) if they are not there. Null outside the level.
-  std::shared_ptr<TileFacts> get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces);
+  /// The tile's facts, made (patches and coverage; albedo as far as `store` knows it) if they are not there. Null
+  /// outside the level. Reads the tile's block: nobody may write it then.
+  std::shared_ptr<TileFacts> get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces,
+                                 const atlas::RadianceStore& store);
   [[nodiscard]] std::shared_ptr<const TileFacts> find(TileId id) const;
 
  private:

@@ -165,6 +165,24 @@ void TileSchedule::pictured(TileId tile, float error) {
   s.stale_border = false;
 }
 
+std::vector<TileId> TileSchedule::recalls_due() {
+  std::vector<TileId> due;
+  for (auto& [tile, s] : tiles_) {
+    if (s.asked_store || !s.display || !s.stored || s.pictured_mean >= 0) continue;
+    s.asked_store = true;
+    due.push_back(tile);
+  }
+  std::sort(due.begin(), due.end());
+  return due;
+}
+
+void TileSchedule::recalled(TileId tile, float error, float samples) {
+  const auto it = tiles_.find(tile);
+  if (it == tiles_.end()) return;
+  it->second.pictured_mean = samples;
+  it->second.error = error;
+}
+
 void TileSchedule::forget_picture(TileId tile) {
   if (const auto it = tiles_.find(tile); it != tiles_.end()) it->second.pictured_mean = -1;
 }

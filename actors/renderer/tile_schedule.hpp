@@ -20,6 +20,8 @@ struct TileJob {
   std::uint32_t most = 0xffffffffu;  ///< no texel beyond this many samples
   std::uint32_t cost = 0;            ///< estimated samples
   bool coarse = false;               ///< for the coarse level, not for the working set
+  bool recall = false;               ///< take the stored picture, draw nothing
+  bool keep = true;                  ///< store the picture
 };
 
 struct ScheduleOptions {
@@ -50,6 +52,11 @@ class TileSchedule {
   /// of their work; and, when no first pass waits, those whose neighbour got its first light.
   [[nodiscard]] std::vector<TileId> pictures_due() const;
   void pictured(TileId tile, float error);
+
+  /// Tiles that were never pictured here, but whose light, and so perhaps whose picture, is stored. Each comes once.
+  [[nodiscard]] std::vector<TileId> recalls_due();
+  /// A stored picture of the tile, made from a mean of `samples` a texel, was sent.
+  void recalled(TileId tile, float error, float samples);
   /// The picture did not reach anybody: it is due again.
   void forget_picture(TileId tile);
   [[nodiscard]] const TexelMask* mask_of(TileId tile) const;
@@ -60,6 +67,7 @@ class TileSchedule {
     float weight = 0;
     bool display = true;
     bool surveyed = false;
+    bool asked_store = false;  // for its picture
     bool stored = false;
     bool fresh_texels = false;  // some were shaded for the first time since the last picture
     bool stale_border = false;

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "actors/renderer/display_curve.hpp"
 #include "actors/runtime/deterministic_system.hpp"
 #include "tests/unit/renderer_tile/made_up_surface.hpp"
 
@@ -251,6 +252,57 @@ TEST_F(RendererActorTest, tiles_outside_the_atlas_are_ignored) {
   system_->run_until_idle();
   EXPECT_TRUE(pictured().contains(1));
   EXPECT_TRUE(system_->failures().empty());
+}
+
+TEST_F(RendererActorTest, a_restart_shows_stored_pictures_before_it_computes_anything) {
+  start();
+  ask({request(1), request(2)});
+  system_->run_until_idle();
+  std::map<std::uint32_t, std::shared_ptr<const TileImage>> last;
+  for (const auto& t : received_->tiles) last[t.tile.index()] = t.image;
+  order_.clear();
+  options_.schedule.max_samples = 64;
+  start();
+  std::size_t shown_before_light = 0;
+  surfaces_->world.light = [&](TileId, int, std::uint32_t) {
+    if (shown_before_light == 0) shown_before_light = received_->tiles.size();
+    return TexelLight{glm::vec3(0.2f), glm::vec3(0.3f)};
+  };
+  ask({request(1), request(2), request(3)});
+  system_->run_until_idle();
+  ASSERT_EQ(shown_before_light, 2u);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(received_->tiles[i].image->rgb, last[received_->tiles[i].tile.index()]->rgb);
+  EXPECT_EQ(pictured(), (std::set<std::uint32_t>{1, 2, 3}));
+}
+
+TEST_F(RendererActorTest, pictures_of_another_exposure_are_not_shown_again) {
+  start();
+  ask({request(1)});
+  system_->run_until_idle();
+  options_.display.exposure = 0.5f;
+  start();
+  ask({request(1)});
+  system_->run_until_idle();
+  ASSERT_FALSE(received_->tiles.empty());
+  EXPECT_NE(received_->tiles[0].image->rgb[3 * 100], 0);
+  EXPECT_LT(received_->tiles[0].image->rgb[3 * 100], srgb_code(0.5f));
+}
+
+TEST_F(RendererActorTest, a_restart_shows_the_coarse_level_at_once_and_goes_on_where_it_stopped) {
+  options_.coarse_rounds = 4;
+  start();
+  system_->run_until_idle();
+  ASSERT_FALSE(coarse_.empty());
+  const auto last = coarse_.back();
+  coarse_.clear();
+  samples_.clear();
+  options_.coarse_rounds = 5;
+  start();
+  system_->run_until_idle();
+  ASSERT_GE(coarse_.size(), 2u);
+  EXPECT_EQ(coarse_.front()->rgb, last->rgb);
+  EXPECT_EQ(samples_[TileId(1, 0)].size(), 900u);  // one round, not five
 }
 
 }  // namespace

@@ -303,7 +303,8 @@ TEST_F(RadianceStoreTest, disk_is_taken_only_for_shaded_tiles) {
   for (std::uint32_t i = 0; i < 100; ++i) put(**store, TileId(0, i * 2000), 1.0f);
   struct stat info{};
   ASSERT_EQ(::stat((*store)->path().c_str(), &info), 0);
-  EXPECT_LT(info.st_blocks * 512, 100 * 36864 + 2 * 1'200'000 + 1'100'000);  // all tiles would take 9 GB
+  EXPECT_LT(info.st_blocks * 512,
+            100 * RadianceStore::kBlockBytes + 2 * 1'200'000 + 1'500'000);  // all tiles would take 11 GB
 }
 
 TEST_F(RadianceStoreTest, new_tiles_are_refused_at_the_size_limit_and_old_ones_go_on) {
@@ -315,6 +316,88 @@ TEST_F(RadianceStoreTest, new_tiles_are_refused_at_the_size_limit_and_old_ones_g
   EXPECT_EQ(store->counters().refused_full, 1u);
   put(*store, TileId(0, 2), 1.0f);
   EXPECT_EQ(store->version(TileId(0, 2)), 2u);
+}
+
+TEST_F(RadianceStoreTest, albedo_is_there_after_a_restart_and_starts_unknown) {
+  TileAlbedo albedo;
+  albedo.bits[7] = {65535, 1, 300};
+  albedo.points[7] = 4;
+  {
+    auto store = open();
+    put(*store, TileId(0, 0), 1.0f);
+    put(*store, TileId(0, 1), 1.0f);
+    store->begin_update(TileId(0, 0))->put_albedo(albedo);
+  }
+  auto store = open();
+  EXPECT_EQ(store->read(TileId(0, 0))->albedo(), albedo);
+  EXPECT_EQ(store->read(TileId(0, 1))->albedo(), TileAlbedo{});
+}
+
+TEST_F(RadianceStoreTest, damaged_albedo_is_refused_with_its_tile) {
+  {
+    auto store = open();
+    put(*store, TileId(0, 0), 1.0f);
+    TileAlbedo albedo;
+    albedo.points.fill(4);
+    store->begin_update(TileId(0, 0))->put_albedo(albedo);
+  }
+  overwrite(4096 * 2 + 64 + sizeof(float) * kPlanes * kTileTexels + 10, "x");
+  auto store = open();
+  EXPECT_FALSE(store->read(TileId(0, 0)));
+  EXPECT_EQ(store->counters().torn, 1u);
+}
+
+StoredPicture picture_of(std::uint8_t grey) {
+  StoredPicture p;
+  p.rgb.fill(grey);
+  p.coverage.fill(200);
+  p.covered = 1;
+  p.error = 0.25f;
+  p.samples = 12;
+  return p;
+}
+
+TEST_F(RadianceStoreTest, a_picture_is_there_after_a_restart_under_its_tag_only) {
+  {
+    auto store = open();
+    put(*store, TileId(0, 0), 1.0f);
+    store->put_picture(TileId(0, 0), 77, picture_of(10));
+    store->put_picture(TileId(0, 0), 77, picture_of(99));
+    store->put_picture(TileId(0, 1), 77, picture_of(99));  // no light: nothing to keep it beside
+  }
+  auto store = open();
+  EXPECT_EQ(store->picture(TileId(0, 0), 77), picture_of(99));
+  EXPECT_FALSE(store->picture(TileId(0, 0), 78));
+  EXPECT_FALSE(store->picture(TileId(0, 0), 0));
+  EXPECT_FALSE(store->picture(TileId(0, 1), 77));
+  EXPECT_EQ(store->counters().tiles, 1u);
+}
+
+TEST_F(RadianceStoreTest, a_damaged_picture_is_refused_and_its_light_is_not) {
+  {
+    auto store = open();
+    put(*store, TileId(0, 0), 1.0f);
+    store->put_picture(TileId(0, 0), 77, picture_of(10));
+  }
+  overwrite(4096 * 2 + RadianceStore::kBlockBytes - 4096, "damage");
+  auto store = open();
+  EXPECT_TRUE(store->read(TileId(0, 0)));
+  EXPECT_FALSE(store->picture(TileId(0, 0), 77));
+  EXPECT_EQ(store->counters().torn, 0u);
+}
+
+TEST_F(RadianceStoreTest, a_new_tile_in_an_old_block_has_no_picture) {
+  {
+    auto store = open();
+    put(*store, TileId(0, 0), 1.0f);
+    store->put_picture(TileId(0, 0), 77, picture_of(10));
+  }
+  overwrite(4096 * 2 + 64 + 10, "x");  // its light is torn
+  auto store = open();
+  EXPECT_FALSE(store->picture(TileId(0, 0), 77));
+  put(*store, TileId(0, 0), 1.0f);
+  EXPECT_TRUE(store->read(TileId(0, 0)));
+  EXPECT_FALSE(store->picture(TileId(0, 0), 77));
 }
 
 TEST_F(RadianceStoreTest, tiles_outside_the_atlas_do_not_exist) {

@@ -29,7 +29,7 @@ class TileDisplayTest : public ::testing::Test {
   ShadingResult shade(TileId id, std::uint32_t passes, const TexelMask& mask = TexelMask::all()) {
     auto result = shade_tile(*store_, id, mask, passes, *world_.tile(id));
     EXPECT_TRUE(result);
-    facts_.get(id, level_, world_)->learn_albedo(*world_.tile(id), mask);
+    facts_.get(id, level_, world_, *store_)->learn_albedo(*world_.tile(id), mask);
     return *result;
   }
   TilePicture draw(TileId id, float filter = 384, const TexelMask& mask = TexelMask::all()) {

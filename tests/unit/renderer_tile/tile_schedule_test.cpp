@@ -20,6 +20,8 @@ TileRequest request(std::uint32_t index, float weight, bool display = true) {
   return r;
 }
 
+bool all_stored(TileId) { return true; }
+
 TileProgress at(float samples, std::uint32_t texels = 10) {
   TileProgress p;
   p.least = p.mean = samples;
@@ -201,6 +203,37 @@ TEST(CoarseCanvasTest, tiles_without_light_take_the_nearest_colour) {
   EXPECT_EQ(picture->width, 90u);
   EXPECT_EQ(picture->height, 30u);
   EXPECT_TRUE(std::all_of(picture->rgb.begin(), picture->rgb.end(), [](auto v) { return v == 90; }));
+}
+
+TEST_F(TileScheduleTest, stored_tiles_are_asked_for_their_picture_once) {
+  schedule.replace({request(1, 0.5f), request(2, 0.5f, false)}, all_stored);
+  EXPECT_EQ(schedule.recalls_due(), std::vector<TileId>{TileId(0, 1)});  // borders show nothing
+  EXPECT_TRUE(schedule.recalls_due().empty());
+  schedule.replace({request(1, 0.5f), request(3, 0.5f)}, nothing_stored);
+  EXPECT_TRUE(schedule.recalls_due().empty());
+}
+
+TEST_F(TileScheduleTest, a_recalled_picture_is_drawn_anew_only_when_samples_have_grown) {
+  schedule.replace({request(1, 0.5f)}, all_stored);
+  static_cast<void>(schedule.recalls_due());
+  schedule.recalled(TileId(0, 1), 0.1f, 8);
+  schedule.shaded(TileId(0, 1), at(8), 0);  // surveyed: as far as the picture
+  EXPECT_TRUE(schedule.pictures_due().empty());
+  schedule.shaded(TileId(0, 1), at(16), 80);
+  EXPECT_EQ(schedule.pictures_due(), std::vector<TileId>{TileId(0, 1)});
+}
+
+TEST(CoarseRounds, resume_after_the_rounds_that_are_stored) {
+  CoarseRounds rounds(1, {3, 3}, 64);
+  rounds.resume(16);
+  EXPECT_FALSE(rounds.opening());
+  EXPECT_TRUE(rounds.first_pass_done());
+  const auto jobs = rounds.next_batch(1);
+  ASSERT_FALSE(jobs.empty());
+  EXPECT_EQ(jobs[0].most, 17u);
+  CoarseRounds done(1, {3, 3}, 64);
+  done.resume(1000);
+  EXPECT_TRUE(done.finished());
 }
 
 }  // namespace
