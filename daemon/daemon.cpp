@@ -65,6 +65,17 @@ session::SessionPolicy session_policy(const config::Config& config, const scene:
   return policy;
 }
 
+std::shared_ptr<const tile_scheduler::CoarseLuma> luma_of(const renderer::CoarsePicture& picture) {
+  auto out = std::make_shared<tile_scheduler::CoarseLuma>();
+  out->width = picture.width;
+  out->height = picture.height;
+  out->luma.reserve(picture.rgb.size() / 3);
+  for (std::size_t i = 0; i + 2 < picture.rgb.size(); i += 3)
+    out->luma.push_back(static_cast<std::uint8_t>(
+        (13933 * picture.rgb[i] + 46871 * picture.rgb[i + 1] + 4732 * picture.rgb[i + 2] + 32768) >> 16));  // BT.709
+  return out;
+}
+
 encoder::EncoderOptions encoder_options(const config::Config& config, StreamId stream,
                                         const tile_scheduler::StreamFormat& format) {
   encoder::EncoderOptions options;
@@ -158,13 +169,14 @@ void Daemon::Parts::spawn_actors() {
   parts.options = renderer_options(config, world.exposure);
   parts.scheduler = scheduler;
   parts.metrics = &metrics;
-  parts.coarse = [to = coarse](const std::shared_ptr<const renderer::CoarsePicture>& from) {
+  parts.coarse = [to = coarse, to_scheduler = scheduler](const std::shared_ptr<const renderer::CoarsePicture>& from) {
     auto picture = std::make_shared<encoder::CoarsePicture>();
     picture->version = from->version;
     picture->width = from->width;
     picture->height = from->height;
     picture->rgb = from->rgb;
     to.tell(encoder::CoarseShaded(std::move(picture)));
+    to_scheduler.tell(tile_scheduler::CoarsePictured(luma_of(*from)));
   };
   renderer_ref->set(system->spawn<renderer::RendererActor>("renderer", 1024, std::move(parts)));
 }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/vec2.hpp>
 
 #include "actors/tile_scheduler/dense_index.hpp"
 #include "actors/types/tile_id.hpp"
@@ -26,6 +27,27 @@ struct Chain {
 struct WeightedChain {
   Chain chain;
   float weight = 0;
+};
+
+/// What a chain loses when served at position 0..3 or by CoarseTex, in any one unit.
+using ChainLoss = std::array<float, kChainLength + 1>;
+
+/// Where one sample of a chain looks, in eighths of a texel: into the slot at each of its positions, and into CoarseTex
+/// (at most 2048 a side).
+struct SampleTaps {
+  std::uint32_t chain = 0;  ///< its number in the set that holds both
+  std::array<std::array<std::uint8_t, 2>, kChainLength> at{};
+  std::array<std::uint16_t, 2> coarse{};
+
+  /// `slot` is within [1, 31] but for rounding.
+  void set(std::size_t position, glm::vec2 slot) {
+    for (int axis = 0; axis < 2; ++axis) {
+      const float eighths = slot[axis] * 8.0f + 0.5f;
+      at[position][static_cast<std::size_t>(axis)] =
+          static_cast<std::uint8_t>(eighths > 0 ? (eighths < 255.0f ? eighths : 255.0f) : 0.0f);
+    }
+  }
+  [[nodiscard]] glm::vec2 position(std::size_t i) const { return glm::vec2(at[i][0], at[i][1]) * 0.125f; }
 };
 
 struct TileHash {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "actors/tile_scheduler/tile_detail.hpp"
-
 namespace darm::tile_scheduler {
 
 ImageStore::ImageStore(std::size_t max_bytes) : max_images_(std::max<std::size_t>(1, max_bytes / sizeof(TileImage))) {}
@@ -15,7 +13,6 @@ bool ImageStore::put(const ShadedTile& shaded) {
   if (!is_new && shaded.version <= entry.image.version) return false;
   entry.image.version = shaded.version;
   entry.image.error = shaded.error;
-  entry.image.detail = detail_of(*shaded.image);
   entry.image.image = shaded.image;
   if (is_new) {
     by_age_.push_front(shaded.tile);

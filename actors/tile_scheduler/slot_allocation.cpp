@@ -4,13 +4,13 @@
 #include <numeric>
 #include <queue>
 
-#include "actors/tile_scheduler/tile_detail.hpp"
-
 namespace darm::tile_scheduler {
 namespace {
 
 constexpr std::uint32_t kNone = TileIndex::kAbsent;
 constexpr int kRounds = 16;
+constexpr std::size_t kFirstExchange = 8;   // the chosen over this are exchanged at first
+constexpr std::size_t kLastExchange = 256;  // and over this at last
 
 // The request with tiles as dense numbers, and per tile the chains it can serve.
 class Problem {
@@ -20,7 +20,7 @@ class Problem {
     links_.resize(request.chains.size());
     loss_.resize(request.chains.size());
     for (std::size_t c = 0; c < request.chains.size(); ++c) read_chain(c);
-    if (request.detail) scale_losses();
+    if (request.losses.size() == loss_.size()) loss_.assign(request.losses.begin(), request.losses.end());
     make_entries();
     resident_.assign(tiles_.size(), false);
     for (const auto tile : request.residents)
@@ -60,6 +60,8 @@ class Problem {
   void fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const;
   /// Takes out tiles whose every sample has a finer one among `chosen`. True if there were any.
   bool prune(std::vector<std::uint32_t>& chosen) const;
+  /// Trades tiles that matter least for tiles that would gain most, while that helps.
+  void exchange(std::vector<std::uint32_t>& chosen, bool with_bonus) const;
   /// Benefit if every allowed tile were chosen.
   [[nodiscard]] double upper_bound() const {
     double sum = 0;
@@ -74,7 +76,6 @@ class Problem {
   [[nodiscard]] Allocation result(std::vector<std::uint32_t> chosen) const;
 
  private:
-  using Losses = std::array<float, kChainLength + 1>;
   struct Entry {
     std::uint32_t chain;
     float loss;    // of the chain if this tile serves it
@@ -94,32 +95,8 @@ class Problem {
       loss_[c][static_cast<std::size_t>(i)] = serving_loss(chain, i, request_.coarse_level, options_);
   }
 
-  void scale_losses() {
-    std::vector<float> known(tiles_.size(), -1.0f);
-    std::vector<bool> asked(tiles_.size(), false);
-    std::vector<float> detail(request_.chains.size(), -1.0f);
-    double sum = 0;
-    double weight = 0;
-    for (std::size_t c = 0; c < request_.chains.size(); ++c) {
-      for (const auto tile : request_.chains[c].chain.tiles) {
-        if (tile == kNoTile || detail[c] >= 0) continue;
-        const auto number = tiles_.find(tile);
-        if (!asked[number]) known[number] = request_.detail(tile);
-        asked[number] = true;
-        detail[c] = known[number];
-      }
-      if (detail[c] < 0) continue;
-      sum += double(request_.chains[c].weight) * double(detail[c]);
-      weight += double(request_.chains[c].weight);
-    }
-    if (!(weight > 0)) return;
-    const auto usual = static_cast<float>(sum / weight);
-    for (std::size_t c = 0; c < loss_.size(); ++c) {
-      if (detail[c] < 0) continue;
-      const float factor = detail_factor(detail[c], usual);
-      for (auto& loss : loss_[c]) loss *= factor;
-    }
-  }
+  void drop_least(std::vector<std::uint32_t>& chosen, std::size_t count) const;
+  [[nodiscard]] double benefit_of(const std::vector<std::uint32_t>& chosen) const;
 
   void make_entries() {
     first_.assign(tiles_.size() + 1, 0);
@@ -157,7 +134,7 @@ class Problem {
   std::vector<bool> allowed_;
   std::vector<bool> resident_;
   std::vector<std::array<std::uint32_t, kChainLength>> links_;  // per chain: allowed tiles, else kNone
-  std::vector<Losses> loss_;
+  std::vector<ChainLoss> loss_;
   std::vector<std::uint32_t> first_;  // per tile: its entries
   std::vector<Entry> entries_;
 };
@@ -219,6 +196,57 @@ bool Problem::prune(std::vector<std::uint32_t>& chosen) const {
   return std::erase_if(chosen, [&](std::uint32_t tile) { return !serves[tile]; }) > 0;
 }
 
+// Greedy picks coarse tiles first; finer ones that come later leave some of them with little to do, yet never nothing.
+// Those are taken back, a share of the slots at a time, and the slots given anew.
+void Problem::exchange(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
+  double best = benefit_of(chosen);
+  const std::size_t least = std::max<std::size_t>(1, chosen.size() / kLastExchange);
+  std::size_t count = std::max(least, chosen.size() / kFirstExchange);
+  while (count >= least) {
+    auto trial = chosen;
+    drop_least(trial, count);
+    fill(trial, with_bonus);
+    const double benefit = benefit_of(trial);
+    if (benefit > best) {
+      best = benefit;
+      chosen = std::move(trial);
+    } else {
+      count /= 2;
+    }
+  }
+}
+
+void Problem::drop_least(std::vector<std::uint32_t>& chosen, std::size_t count) const {
+  std::vector<bool> taken(tiles_.size(), false);
+  for (const auto tile : chosen) taken[tile] = true;
+  std::vector<double> loss(tiles_.size(), 0.0);  // if the tile alone were taken out
+  for (std::size_t c = 0; c < links_.size(); ++c) {
+    const auto is_there = [&](std::size_t i) { return links_[c][i] != kNone && taken[links_[c][i]]; };
+    std::size_t served = 0;
+    while (served < kChainLength && !is_there(served)) ++served;
+    if (served == kChainLength) continue;
+    std::size_t next = served + 1;
+    while (next < kChainLength && !is_there(next)) ++next;
+    loss[links_[c][served]] += double(request_.chains[c].weight) * double(loss_[c][next] - loss_[c][served]);
+  }
+  std::sort(chosen.begin(), chosen.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return loss[a] != loss[b] ? loss[a] > loss[b] : tiles_.keys()[a] < tiles_.keys()[b];
+  });
+  chosen.resize(chosen.size() - std::min(count, chosen.size()));
+}
+
+double Problem::benefit_of(const std::vector<std::uint32_t>& chosen) const {
+  std::vector<bool> taken(tiles_.size(), false);
+  for (const auto tile : chosen) taken[tile] = true;
+  double sum = 0;
+  for (std::size_t c = 0; c < links_.size(); ++c) {
+    std::size_t position = 0;
+    while (position < kChainLength && (links_[c][position] == kNone || !taken[links_[c][position]])) ++position;
+    sum += double(request_.chains[c].weight) * double(loss_[c][kServedByCoarse] - loss_[c][position]);
+  }
+  return sum;
+}
+
 Allocation Problem::result(std::vector<std::uint32_t> chosen) const {
   std::vector<bool> taken(tiles_.size(), false);
   for (const auto tile : chosen) taken[tile] = true;
@@ -267,6 +295,7 @@ Allocation allocate_slots(const AllocationRequest& request, const AllocationOpti
   }
   std::vector<std::uint32_t> fresh;
   problem.fill(fresh, true);
+  if (request.exchange) problem.exchange(fresh, true);
   auto best = problem.result(std::move(fresh));
   const double lost = std::max(0.0, most - best.benefit);
   const double spared = best.benefit - stay.benefit;

@@ -16,8 +16,8 @@ struct AllocationOptions {
   std::array<float, 4> loss{0.0f, 1.0f, 2.2f, 3.5f};
   float loss_per_further_level = 1.4f;  ///< for CoarseTex, when it is more than three levels coarser
   float coarse_penalty = 0.5f;          ///< CoarseTex is also the least well lit: it loses this much more
-  float resident_bonus = 0.15f;         ///< a resident tile's gain counts for this much more
-  float least_improvement = 0.05f;      ///< residents stay if moving lessens what is lost by at most this share of it
+  float resident_bonus = 0.05f;         ///< a resident tile's gain counts for this much more
+  float least_improvement = 0.1f;       ///< residents stay if moving lessens what is lost by at most this share of it
   float negligible = 1e-4f;             ///< or by at most this share of the benefit that slots without limit would have
 };
 
@@ -25,11 +25,12 @@ struct AllocationRequest {
   std::span<const WeightedChain> chains;  ///< distinct chains, weights >= 0
   std::span<const TileId> residents;      ///< distinct tiles
   std::function<bool(TileId)> available;  ///< tiles that may be granted; null: all
-  /// detail_of() the tile's picture, negative if there is none; null: none is known. A chain's losses are scaled by the
-  /// detail of its finest known tile, so that slots go where a coarser level would show.
-  std::function<float(TileId)> detail;
+  /// measure_losses(): parallel to `chains`, rising with the position. Empty: not known, serving_loss() stands in.
+  std::span<const ChainLoss> losses;
   std::size_t slots = 0;
   int coarse_level = 0;  ///< Layout::coarse_level()
+  /// Also exchange tiles after the greedy choice: a few percent less is lost, for about twice the time.
+  bool exchange = true;
 };
 
 /// The tiles to hold and what they serve.
@@ -42,10 +43,11 @@ struct Allocation {
 
 /// Maximises the benefit under the slot limit. If every chain's finest available tile fits, that is the answer
 /// (optimal); else lazy greedy (Minoux 1978) on the facility-location gain, at least 1 - 1/e of the optimum but for the
-/// residents' bonus. Deterministic. O(entries log entries) with few recomputations in practice.
+/// residents' bonus, and then tiles are exchanged while that helps. Deterministic. O(entries log entries) with few
+/// recomputations in practice.
 [[nodiscard]] Allocation allocate_slots(const AllocationRequest& request, const AllocationOptions& options = {});
 
-/// Loss of a chain served at `position` (0..3 or kServedByCoarse).
+/// Loss, by the options' table, of a chain served at `position` (0..3 or kServedByCoarse).
 [[nodiscard]] float serving_loss(const Chain& chain, int position, int coarse_level, const AllocationOptions& options);
 
 }  // namespace darm::tile_scheduler

@@ -80,7 +80,7 @@ void StreamState::write_slot(encoder::ComposeFrame& frame, SlotIndex slot, const
 
 void StreamState::enter_new(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images) {
   for (const auto tile : wanted) {
-    if (frame.writes.size() >= options_.max_writes) return;
+    if (frame.writes.size() >= options_.max_writes && !frame.key) return;
     if (table_.slot_of(tile) != kNoSlot) continue;
     const auto* image = images(tile);
     if (image == nullptr || image->image == nullptr) continue;

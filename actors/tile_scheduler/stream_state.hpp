@@ -21,7 +21,6 @@ namespace darm::tile_scheduler {
 struct StoredImage {
   std::uint32_t version = 0;
   float error = 0;
-  float detail = 0;  ///< detail_of(*image)
   std::shared_ptr<const TileImage> image;
 };
 /// Null: the tile has no picture yet. The pointer is used before the next call only.

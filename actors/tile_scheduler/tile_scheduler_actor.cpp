@@ -101,6 +101,8 @@ void TileSchedulerActor::on(TilesShaded&& message) {
   for (const auto& tile : message.tiles) pictures_came_ = images_.put(tile) || pictures_came_;
 }
 
+void TileSchedulerActor::on(CoarsePictured&& message) { coarse_ = std::move(message.picture); }
+
 void TileSchedulerActor::on(FrameDone&& message) {
   for (auto& [id, session] : sessions_) {
     if (session->stream_id != message.stream) continue;
@@ -123,8 +125,11 @@ void TileSchedulerActor::on(Tick&&) {
   bool work_changed = false;
   for (auto& [id, session] : sessions_) {
     if (session->job && session->job->done()) finish_view(*session);  // its ViewTraced found a full mailbox
+    session->pictures_since = session->pictures_since || pictures_came_;
     const bool expired = session->set.expire(now_us());
-    if (expired) {
+    const bool reweigh = session->demand.crowded && session->pictures_since &&
+                         now_us() - session->weighed_at >= options_.reweigh_interval;
+    if (expired || reweigh) {
       reallocate(*session);
       work_changed = true;
     } else if (pictures_came_ && session->set.passes() > 0) {
@@ -137,12 +142,21 @@ void TileSchedulerActor::on(Tick&&) {
   if (work_changed) send_work();
 }
 
+int TileSchedulerActor::passes_due(Session& session, bool moved) const {
+  if (moved) return options_.passes_moving;
+  const int done = session.set.passes();
+  const bool unlit = !session.demand.complete && done >= options_.passes_unlit;
+  if (unlit && ++session.updates_waited < options_.updates_unlit) return 0;
+  session.updates_waited = 0;
+  return std::min(options_.passes_still, kAllPasses - done);
+}
+
 // Begins the next trace of a session's newest view, if there is something to find out.
 void TileSchedulerActor::start_view(Session& session) {
   if (session.job || !session.view) return;
   const bool moved = !session.posed || !same_view(*session.posed, *session.view);
   const int done = moved ? 0 : session.set.passes();
-  const int count = std::min(moved ? options_.passes_moving : options_.passes_still, kAllPasses - done);
+  const int count = passes_due(session, moved);
   const bool unanswered = session.view->sequence > session.taken_up;
   session.taken_up = session.view->sequence;
   auto answer = answer_to(*session.view);
@@ -189,7 +203,10 @@ void TileSchedulerActor::finish_view(Session& session) {
 
 void TileSchedulerActor::reallocate(Session& session) {
   const auto started = now_us();
-  session.demand = demand_of(session.set, *layout_, session.stream.table(), images(), options_.allocation);
+  session.demand =
+      demand_of(session.set, *layout_, session.stream.table(), images(), coarse_.get(), options_.allocation);
+  session.weighed_at = now_us();
+  session.pictures_since = false;
   for (const auto tile : session.demand.target.tiles) images_.touch(tile);
   metrics_.observe("darm_allocation_seconds", double(now_us() - started) * 1e-6);
   metrics_.observe("darm_view_tiles", double(session.demand.target.tiles.size()));

@@ -23,9 +23,13 @@ namespace darm::tile_scheduler {
 struct SchedulerOptions {
   double updates_per_second = 10;        ///< 0.1..1000: traces, allocations and frames per session
   int passes_moving = 1;                 ///< visibility passes in the first update of a new pose, 1..64
-  int passes_still = 2;                  ///< and in each further one, until kAllPasses are done
+  int passes_still = 1;                  ///< and in each further one, until kAllPasses are done
+  int passes_unlit = 4;                  ///< while pictures are missing, passes after these come
+  int updates_unlit = 4;                 ///< in one of so many updates: the same cores make the pictures
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
   float coarse_error = 0.25f;            ///< display error assumed of what CoarseTex serves
+  /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.
+  Microseconds reweigh_interval = 1'000'000;
   WorkingSetOptions working_set;
   AllocationOptions allocation;
   StreamOptions stream;
@@ -55,6 +59,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void on(ViewChanged&& message);
   void on(KeyFrameWanted&& message);
   void on(TilesShaded&& message);
+  void on(CoarsePictured&& message);
   void on(FrameDone&& message);
   void on(ViewTraced&& message);
   void on(Tick&& message);
@@ -73,6 +78,9 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     CameraSequence taken_up = 0;       // newest sequence that a trace or an answer includes
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
+    int updates_waited = 0;
+    Microseconds weighed_at = 0;  // of demand.target
+    bool pictures_since = false;  // some came after that
     Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
   };
 
@@ -80,6 +88,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   [[nodiscard]] Session* find(SessionId id);
   void schedule_tick();
   void start_view(Session& session);
+  [[nodiscard]] int passes_due(Session& session, bool moved) const;
   void post_slices(const std::shared_ptr<ViewJob>& job);
   void finish_view(Session& session);
   void reallocate(Session& session);
@@ -94,6 +103,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   runtime::MetricSink& metrics_;
   Microseconds period_;
   ImageStore images_;
+  std::shared_ptr<const CoarseLuma> coarse_;  // null: none yet
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   std::uint64_t next_job_ = 1;
   std::uint64_t next_working_set_ = 1;

@@ -72,6 +72,20 @@ struct TilesShaded {
   explicit TilesShaded(std::vector<ShadedTile> t) : tiles(std::move(t)) {}
 };
 
+/// CoarseTex as clients draw it, luma, row-major.
+struct CoarseLuma {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> luma;
+};
+
+/// The coarse level has a new picture.
+struct CoarsePictured {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  std::shared_ptr<const CoarseLuma> picture;
+  explicit CoarsePictured(std::shared_ptr<const CoarseLuma> p) : picture(std::move(p)) {}
+};
+
 /// The encoder has finished a frame of a stream: the scheduler may send the next ComposeFrame.
 struct FrameDone {
   static constexpr auto kOverflow = runtime::Overflow::kReject;
@@ -93,7 +107,7 @@ struct Tick {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
 };
 
-using Inbox =
-    std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, FrameDone, ViewTraced, Tick>;
+using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, CoarsePictured,
+                           FrameDone, ViewTraced, Tick>;
 
 }  // namespace darm::tile_scheduler

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "actors/tile_scheduler/visibility.hpp"
+
 namespace darm::tile_scheduler {
 namespace {
 
@@ -70,14 +72,17 @@ std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout&
   return out;
 }
 
+std::size_t sharp_tiles(const ViewDemand& demand) {
+  TileIndex tiles;
+  for (const auto& [chain, weight] : demand.chains) tiles.insert(chain.tiles[0]);
+  return tiles.size();
+}
+
 AllocationRequest allocation_request(const ViewDemand& demand, std::span<const TileId> residents, std::size_t slots,
-                                     int coarse_level, const ImageLookup& images) {
+                                     int coarse_level) {
   AllocationRequest request;
-  request.detail = [&images](TileId tile) {
-    const auto* stored = images(tile);
-    return stored != nullptr && stored->image != nullptr ? stored->detail : -1.0f;
-  };
   request.chains = demand.chains;
+  request.losses = demand.losses;
   request.residents = residents;
   request.slots = slots;
   request.coarse_level = coarse_level;
@@ -92,12 +97,17 @@ bool has_image(const ImageLookup& images, TileId tile) {
 }  // namespace
 
 ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
-                     const ImageLookup& images, const AllocationOptions& options) {
+                     const ImageLookup& images, const CoarseLuma* coarse, const AllocationOptions& options) {
   ViewDemand demand;
   demand.chains = set.chains();
   const auto residents = table.residents();
-  demand.target =
-      allocate_slots(allocation_request(demand, residents, table.capacity(), layout.coarse_level(), images), options);
+  demand.crowded = sharp_tiles(demand) > table.capacity();
+  // The chains of the present pose come first in chains(), by the numbers that its taps use.
+  if (demand.crowded)
+    demand.losses = measure_losses(demand.chains, set.current().taps(), images, coarse, layout.coarse_level());
+  auto request = allocation_request(demand, residents, table.capacity(), layout.coarse_level());
+  request.exchange = set.passes() >= kTapPasses;  // a view that rests
+  demand.target = allocate_slots(request, options);
   grant_available(demand, layout.coarse_level(), table, images, options);
   demand.requests = requests_of(set, layout, demand);
   return demand;
@@ -106,12 +116,14 @@ ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const P
 void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
                      const AllocationOptions& options) {
   const auto& tiles = demand.target.tiles;
-  if (std::all_of(tiles.begin(), tiles.end(), [&](TileId t) { return has_image(images, t); })) {
+  demand.complete = std::all_of(tiles.begin(), tiles.end(), [&](TileId t) { return has_image(images, t); });
+  if (demand.complete) {
     demand.granted = demand.target;
     return;
   }
   const auto residents = table.residents();
-  auto request = allocation_request(demand, residents, table.capacity(), coarse_level, images);
+  auto request = allocation_request(demand, residents, table.capacity(), coarse_level);
+  request.exchange = false;  // for the time being only
   request.available = [&](TileId t) { return has_image(images, t); };
   demand.granted = allocate_slots(request, options);
 }

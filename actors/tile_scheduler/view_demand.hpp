@@ -6,6 +6,7 @@
 
 #include "actors/atlas/layout.hpp"
 #include "actors/renderer/renderer_messages.hpp"
+#include "actors/tile_scheduler/chain_loss.hpp"
 #include "actors/tile_scheduler/slot_allocation.hpp"
 #include "actors/tile_scheduler/stream_state.hpp"
 #include "actors/tile_scheduler/working_set.hpp"
@@ -15,14 +16,19 @@ namespace darm::tile_scheduler {
 /// What a view asks for, newest allocation.
 struct ViewDemand {
   std::vector<WeightedChain> chains;
+  bool complete = false;                        ///< every tile of the target has a picture
+  bool crowded = false;                         ///< the sharp tiles do not all fit: what coarser ones lose decides
+  std::vector<ChainLoss> losses;                ///< measured if crowded and there are pictures, else empty
   Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded
   Allocation granted;                           ///< the tiles it can have now: these get slots
   std::vector<renderer::TileRequest> requests;  ///< distinct tiles
 };
 
-/// Chooses target and granted tiles for `slots` slots and makes the shading requests of the target.
+/// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. `coarse`:
+/// see measure_losses().
 [[nodiscard]] ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
-                                   const ImageLookup& images, const AllocationOptions& options);
+                                   const ImageLookup& images, const CoarseLuma* coarse,
+                                   const AllocationOptions& options);
 
 /// Chooses `demand.granted` anew after pictures have come.
 void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,

@@ -34,6 +34,11 @@ void set_box(TexelMask& mask, const TexelBox& part) {
     for (int x = part.x0; x <= part.x1; ++x) mask.set(x, y);
 }
 
+// Where texel position `texel` lies inside the slot of its tile: the payload begins at 1.
+glm::vec2 in_slot(const atlas::Level& level, TileId tile, glm::vec2 texel) {
+  return texel - glm::vec2(tile.index() % level.tiles_x, tile.index() / level.tiles_x) * float{kTileSize} + 1.0f;
+}
+
 // Texels around a sample that the pixels within `pixels` of it read if they see the same patch: the bounding box of
 // their footprint parallelogram, clipped to the texels the patch can read.
 void mark_early(const atlas::Layout& layout, const SurfaceSample& sample, float pixels, VisibleSet& out) {
@@ -82,18 +87,29 @@ Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample) {
   return chain;
 }
 
-void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float early_pixels, VisibleSet& out) {
+void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float early_pixels, bool note_taps,
+                VisibleSet& out) {
   const Chain chain = chain_of(layout, sample);
-  out.add(chain, 1.0f);
+  SampleTaps taps;
+  taps.chain = out.add(chain, 1.0f);
   for (std::size_t i = 0; i < chain.tiles.size() && chain.tiles[i] != kNoTile; ++i) {
     const int level_number = sample.level + static_cast<int>(i);
     const auto& level = layout.levels[static_cast<std::size_t>(level_number)];
-    const auto box = taps_at(level, layout.texel_at(sample.patch, level_number, sample.uv));
+    const auto texel = layout.texel_at(sample.patch, level_number, sample.uv);
+    taps.set(i, in_slot(level, chain.tiles[i], texel));
+    const auto box = taps_at(level, texel);
     for_each_tile_part(level, level_number, box, [&](TileId tile, const TexelBox& part) {
       auto* use = out.use(tile);
       if (use == nullptr) return;
       set_box(tile != chain.tiles[i] ? use->border : i == 0 ? use->sharp : use->fallback, part);
     });
+  }
+  if (note_taps) {
+    const auto texel = layout.texel_at(sample.patch, layout.coarse_level(), sample.uv) * 8.0f + 0.5f;
+    for (int axis = 0; axis < 2; ++axis)
+      if (texel[axis] > 0 && texel[axis] < 65535.0f)
+        taps.coarse[static_cast<std::size_t>(axis)] = static_cast<std::uint16_t>(texel[axis]);
+    out.add_taps(taps);
   }
   if (early_pixels > 0) mark_early(layout, sample, early_pixels, out);
 }
@@ -105,6 +121,7 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
   const glm::vec2 offset = pass_offset(pass);
   // After k passes a sample stands for a square of kBlock / sqrt(k) pixels a side; the reach is half of it.
   const float early = pass < kPassesPerPicture ? 0.5f * kBlock / std::sqrt(static_cast<float>(pass + 1)) : 0.0f;
+  const bool note_taps = pass < kTapPasses;
   const auto width = static_cast<float>(viewport.width);
   const auto height = static_cast<float>(viewport.height);
   std::array<SurfaceSample, kMaxLayers> surfaces;
@@ -116,7 +133,8 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
       const float x = static_cast<float>(column * kBlock) + offset.x;
       if (x >= width) break;
       const int layers = sampler.trace(x, y, surfaces);
-      for (int i = 0; i < layers; ++i) add_sample(sampler.layout(), surfaces[static_cast<std::size_t>(i)], early, out);
+      for (int i = 0; i < layers; ++i)
+        add_sample(sampler.layout(), surfaces[static_cast<std::size_t>(i)], early, note_taps, out);
       ++samples;
     }
   }

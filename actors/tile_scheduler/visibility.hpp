@@ -15,6 +15,8 @@ inline constexpr int kBlock = 4;
 /// Passes after which every pixel has been looked at once, and at all four of the client's sample positions.
 inline constexpr int kPassesPerPicture = kBlock * kBlock;
 inline constexpr int kAllPasses = 4 * kPassesPerPicture;
+/// The first passes also note where their samples look (VisibleSet::taps): what coarser levels lose is measured there.
+inline constexpr int kTapPasses = 4;
 
 /// Positions within a pixel of the four samples that the client draws with: a 2x2 grid.
 inline constexpr std::array<glm::vec2, 4> kClientSamples{
@@ -35,8 +37,9 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
 /// Chain of a surface sample: its tile at the sharp level and at up to three coarser ones.
 [[nodiscard]] Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample);
 
-/// Adds one surface sample: its chain, the bilinear taps at each level of the chain, and texels within
-/// `early_pixels` of it (half the side of the square of pixels it stands for; 0: none).
-void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float early_pixels, VisibleSet& out);
+/// Adds one surface sample: its chain, the bilinear taps at each level of the chain (also as SampleTaps if
+/// `note_taps`), and texels within `early_pixels` of it (half the side of the square of pixels it stands for; 0: none).
+void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float early_pixels, bool note_taps,
+                VisibleSet& out);
 
 }  // namespace darm::tile_scheduler

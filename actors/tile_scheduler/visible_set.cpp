@@ -2,19 +2,23 @@
 
 namespace darm::tile_scheduler {
 
-void VisibleSet::add(const Chain& chain, float count) {
+std::uint32_t VisibleSet::add(const Chain& chain, float count) {
   if (last_chain_ < counts_.size() && chains_.keys()[last_chain_] == chain) {
     counts_[last_chain_] += count;
-    return;
+    return last_chain_;
   }
   if (chains_.size() >= kMaxChains && chains_.find(chain) == ChainIndex::kAbsent) {
     ++left_out_;
-    return;
+    return kLeftOut;
   }
   const auto number = chains_.insert(chain);
   if (number == counts_.size()) counts_.push_back(0.0f);
   counts_[number] += count;
-  last_chain_ = number;
+  return last_chain_ = number;
+}
+
+void VisibleSet::add_taps(const SampleTaps& taps) {
+  if (taps_.size() < kMaxTaps && taps.chain < counts_.size()) taps_.push_back(taps);
 }
 
 TileUse* VisibleSet::use(TileId tile) {
@@ -32,7 +36,12 @@ TileUse* VisibleSet::use(TileId tile) {
 }
 
 void VisibleSet::merge(const VisibleSet& other) {
-  for (std::size_t i = 0; i < other.chains().size(); ++i) add(other.chains()[i], other.counts_[i]);
+  std::vector<std::uint32_t> number(other.chains().size());
+  for (std::size_t i = 0; i < other.chains().size(); ++i) number[i] = add(other.chains()[i], other.counts_[i]);
+  for (auto taps : other.taps_) {
+    taps.chain = number[taps.chain];
+    add_taps(taps);
+  }
   for (std::size_t i = 0; i < other.tiles().size(); ++i) {
     auto* mine = use(other.tiles()[i]);
     if (mine == nullptr) continue;

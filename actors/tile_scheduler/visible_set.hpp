@@ -26,9 +26,13 @@ class VisibleSet {
  public:
   static constexpr std::size_t kMaxChains = 262144;
   static constexpr std::size_t kMaxTiles = 65536;
+  static constexpr std::size_t kMaxTaps = 262144;
+  static constexpr std::uint32_t kLeftOut = ChainIndex::kAbsent;
 
-  /// `count` more samples use `chain`.
-  void add(const Chain& chain, float count);
+  /// `count` more samples use `chain`. Its number; kLeftOut if the set is full.
+  std::uint32_t add(const Chain& chain, float count);
+  /// Where a sample of chain number `taps.chain` looks.
+  void add_taps(const SampleTaps& taps);
   /// A sample that hit nothing: counts in samples() only.
   void add_samples(double count) { samples_ += count; }
   /// The texels of `tile`; null if the set is full. Valid until the next call.
@@ -40,6 +44,7 @@ class VisibleSet {
   [[nodiscard]] double samples() const { return samples_; }  ///< picture samples traced, hits or not
   [[nodiscard]] const std::vector<Chain>& chains() const { return chains_.keys(); }
   [[nodiscard]] std::span<const float> counts() const { return counts_; }  ///< parallel to chains()
+  [[nodiscard]] std::span<const SampleTaps> taps() const { return taps_; }
   [[nodiscard]] const std::vector<TileId>& tiles() const { return tiles_.keys(); }
   [[nodiscard]] std::span<const TileUse> uses() const { return uses_; }  ///< parallel to tiles()
   [[nodiscard]] const TileUse* find(TileId tile) const;
@@ -54,6 +59,7 @@ class VisibleSet {
 
   ChainIndex chains_;
   std::vector<float> counts_;
+  std::vector<SampleTaps> taps_;
   TileIndex tiles_;
   std::vector<TileUse> uses_;
   double samples_ = 0;

@@ -114,7 +114,7 @@ int main(int argc, char** argv) {
   const PageTable table(4096);
   ViewDemand demand;
   const auto none = [](TileId) -> const StoredImage* { return nullptr; };
-  const double spent = milliseconds([&] { demand = demand_of(set, *world->layout, table, none, {}); });
+  const double spent = milliseconds([&] { demand = demand_of(set, *world->layout, table, none, nullptr, {}); });
   std::printf(" \"demand_ms\": %.2f, \"requests\": %zu,\n", spent, demand.requests.size());
   ViewReport report;
   const double reported =

@@ -73,11 +73,11 @@ class TileScheduler : public ::testing::Test {
     system_.run_until_idle();
   }
 
-  void open(SessionId id) {
+  void open(SessionId id, std::uint32_t phystex_size = 1024) {
     peers_->sessions->add(
         id, system_.spawn<FakeSession>("session/" + std::to_string(static_cast<unsigned>(id)), 16, &heard_));
     StreamFormat format;
-    format.phystex_size = 1024;
+    format.phystex_size = phystex_size;
     scheduler_.tell(SessionOpened(id, format));
     system_.run_until_idle();
   }
@@ -164,7 +164,7 @@ TEST_F(TileScheduler, KeepsOneFrameInFlight) {
 TEST_F(TileScheduler, StopsTracingAndSendsNothingWhenAStillViewIsKnown) {
   open(ann_);
   look(ann_, 1, ahead_);
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 90; ++i) {
     shade_all(1);
     finish_frame(first_);
     tick();
@@ -183,6 +183,40 @@ TEST_F(TileScheduler, StopsTracingAndSendsNothingWhenAStillViewIsKnown) {
   tick();
   EXPECT_EQ(heard_.frames[first_].size(), frames + 1) << "refinements still make frames";
   EXPECT_TRUE(heard_.frames[first_].back().edits.empty());
+}
+
+TEST_F(TileScheduler, LooksCloserLessOftenWhilePicturesAreMissing) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  const auto traces_in = [&](int ticks, bool lit) {
+    int traces = 0;
+    system_.clear_log();
+    for (int i = 0; i < ticks; ++i) {
+      if (lit) shade_all(1);
+      tick();
+    }
+    for (const auto& handled : system_.messages_log()) traces += handled.message == "ViewTraced" ? 1 : 0;
+    return traces;
+  };
+  EXPECT_EQ(traces_in(3, false), 3) << "the first four passes come at once";
+  EXPECT_EQ(traces_in(12, false), 3);
+  EXPECT_GE(traces_in(12, true), 10);
+}
+
+TEST_F(TileScheduler, WeighsACrowdedStillViewAnewByItsPictures) {
+  open(ann_, 2 * kSlotSize);  // four slots
+  look(ann_, 1, ahead_);
+  for (int i = 0; i < 90; ++i) {
+    shade_all(1);
+    finish_frame(first_);
+    tick();
+  }
+  const auto work = heard_.work.size();
+  for (int i = 0; i < 20; ++i) tick();
+  EXPECT_EQ(heard_.work.size(), work) << "no new pictures, no new weights";
+  shade_all(2);
+  for (int i = 0; i < 20; ++i) tick();
+  EXPECT_EQ(heard_.work.size(), work + 1);
 }
 
 TEST_F(TileScheduler, AnswersEveryCameraOfAMovingView) {

@@ -125,6 +125,46 @@ TEST(SlotAllocation, BeatsRandomChoices) {
   }
 }
 
+TEST(SlotAllocation, TradingOneTileForAnotherGainsNextToNothing) {
+  for (std::uint32_t seed = 1; seed <= 10; ++seed) {
+    const RandomView view(seed);
+    for (const std::size_t slots : {5u, 25u}) {
+      const auto chosen = allocate_slots(view.request(slots)).tiles;
+      if (chosen.size() < slots) continue;  // everything fits
+      const double benefit = benefit_of(view, chosen);
+      std::set<TileId> all;
+      for (const auto& c : view.chains)
+        for (const auto t : c.chain.tiles)
+          if (t != kNoTile) all.insert(t);
+      double best = benefit;
+      for (std::size_t out = 0; out < chosen.size(); ++out)
+        for (const auto in : all) {
+          auto trial = chosen;
+          trial[out] = in;
+          best = std::max(best, benefit_of(view, trial));
+        }
+      EXPECT_LE(best, 1.05 * benefit) << "seed " << seed << ", " << slots << " slots";
+    }
+  }
+}
+
+TEST(SlotAllocation, MeasuredLossesStandInPlaceOfTheTable) {
+  const RandomView view(3);
+  std::vector<ChainLoss> losses;
+  for (const auto& c : view.chains) {
+    ChainLoss loss;
+    for (int i = 0; i <= kChainLength; ++i)
+      loss[static_cast<std::size_t>(i)] = 7 * serving_loss(c.chain, i, view.coarse, {});
+    losses.push_back(loss);
+  }
+  auto measured = view.request(40);
+  measured.losses = losses;
+  const auto by_table = allocate_slots(view.request(40));
+  const auto by_measure = allocate_slots(measured);
+  EXPECT_EQ(by_measure.tiles, by_table.tiles);  // the unit does not matter
+  EXPECT_NEAR(by_measure.benefit, 7 * by_table.benefit, 1e-3 * by_measure.benefit);
+}
+
 TEST(SlotAllocation, StillCameraCausesNoChurn) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     const RandomView view(seed);

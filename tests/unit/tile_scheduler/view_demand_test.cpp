@@ -25,7 +25,7 @@ class Demand : public ::testing::Test {
     }
   }
   [[nodiscard]] ViewDemand demand(std::size_t slots) const {
-    return demand_of(set_, *world_.layout, PageTable(slots), [this](TileId t) { return find(t); }, {});
+    return demand_of(set_, *world_.layout, PageTable(slots), [this](TileId t) { return find(t); }, nullptr, {});
   }
   [[nodiscard]] const StoredImage* find(TileId tile) const {
     const auto it = images_.find(tile);

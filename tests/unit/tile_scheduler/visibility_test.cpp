@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <set>
+#include <tuple>
 
 #include "actors/tile_scheduler/texel_taps.hpp"
 #include "actors/tile_scheduler/working_set.hpp"
@@ -179,6 +180,45 @@ TEST(Visibility, FirstPassAlreadyMarksMostOfWhatTheEyeSees) {
   }
   EXPECT_GT(marked / seen, 0.9);
   EXPECT_LT(extra / seen, 0.4);  // a small picture: many pixels lie at edges
+}
+
+TEST(VisibleSetTaps, NameTheirChainAlsoAfterSetsAreMerged) {
+  const auto world = make_room();
+  const ViewSampler sampler(*world.layout, *world.rays, look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55), kViewport);
+  VisibleSet whole, upper, lower;
+  trace_rows(sampler, 0, 0, block_rows(kViewport), whole);
+  trace_rows(sampler, 0, 0, 10, upper);
+  trace_rows(sampler, 0, 10, block_rows(kViewport), lower);
+  VisibleSet merged;
+  merged.merge(lower);  // chains get other numbers than in `whole`
+  merged.merge(upper);
+  ASSERT_EQ(merged.taps().size(), whole.taps().size());
+  const auto key = [](const VisibleSet& set, const SampleTaps& t) {
+    return std::tuple(set.chains()[t.chain].tiles[0].packed, t.at, t.coarse);
+  };
+  std::multiset<decltype(key(whole, {}))> a, b;
+  for (const auto& t : whole.taps()) a.insert(key(whole, t));
+  for (const auto& t : merged.taps()) b.insert(key(merged, t));
+  EXPECT_EQ(a, b);
+  VisibleSet late;
+  trace_rows(sampler, kTapPasses, 0, block_rows(kViewport), late);
+  EXPECT_TRUE(late.taps().empty());
+}
+
+TEST(VisibleSetTaps, LookInsideTheSlotWhereTheClientLooks) {
+  const auto world = make_room();
+  const ViewSampler sampler(*world.layout, *world.rays, look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55), kViewport);
+  VisibleSet set;
+  trace_rows(sampler, 0, 0, block_rows(kViewport), set);
+  ASSERT_FALSE(set.taps().empty());
+  for (const auto& t : set.taps())
+    for (std::size_t i = 0; i < kChainLength; ++i) {
+      if (set.chains()[t.chain].tiles[i] == kNoTile) continue;
+      EXPECT_GE(t.position(i).x, 1.0f);
+      EXPECT_LE(t.position(i).x, 31.0f);
+      EXPECT_GE(t.position(i).y, 1.0f);
+      EXPECT_LE(t.position(i).y, 31.0f);
+    }
 }
 
 TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
