@@ -94,6 +94,7 @@ encoder::EncoderOptions encoder_options(const config::Config& config, StreamId s
 struct Daemon::Parts {
   config::Config config;
   std::uint64_t seed = 0;
+  atlas::StoreCounters reported;  // what report_store() has seen
   observe::PrometheusSink metrics;
   std::optional<observe::Health> health;
   World world;
@@ -147,7 +148,7 @@ tile_scheduler::Peers Daemon::Parts::make_peers(std::shared_ptr<LateRef<renderer
                                                 encoder_options(config, stream, format), std::move(receivers),
                                                 scheduler, metrics);
   };
-  peers.destroy_encoder = [](StreamId) {};
+  peers.destroy_encoder = [this](StreamId, const runtime::Ref<encoder::Inbox>& encoder) { system->stop(encoder); };
   peers.set_receivers = [streams = streams](StreamId stream, std::vector<SessionId> receivers) {
     streams->set(stream, std::move(receivers));
   };
@@ -235,6 +236,21 @@ Result<Addresses> Daemon::start(std::function<void(const std::string&)> on_fatal
   auto addresses = parts.listen();
   if (addresses) parts.health->set_ready(true);
   return addresses;
+}
+
+void Daemon::report_store() {
+  auto& parts = *parts_;
+  if (!parts.world.store) return;
+  const auto now = parts.world.store->counters();
+  if (now.refused_full > 0 && parts.reported.refused_full == 0)
+    spdlog::warn(
+        "radiance store: full at {} tiles, so what is newly seen stays coarse; raise state.max_store_bytes, make room "
+        "on "
+        "the disk, or remove {} while darmd is stopped",
+        now.tiles, parts.world.store->path().string());
+  if (now.torn > parts.reported.torn)
+    spdlog::warn("radiance store: {} damaged tiles refused so far; they are lit anew", now.torn);
+  parts.reported = now;
 }
 
 bool Daemon::stop(std::chrono::milliseconds deadline) {

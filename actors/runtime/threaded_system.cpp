@@ -33,6 +33,7 @@ class ThreadedSystem::Core final : public Host, public Executor {
   void retired(const CellBase& cell) override {
     const std::lock_guard lock(mutex_);
     living_.erase(&cell);
+    count_living(cell, -1);
     if (living_.empty()) nobody_left_.notify_all();
   }
   void failed(const SupervisionPolicy& policy, const Failure& failure) override {
@@ -55,6 +56,7 @@ class ThreadedSystem::Core final : public Host, public Executor {
     const std::lock_guard lock(mutex_);
     if (closing_) return false;
     living_.emplace(cell.get(), cell);
+    count_living(*cell, 1);
     return true;
   }
 
@@ -89,6 +91,12 @@ class ThreadedSystem::Core final : public Host, public Executor {
   void forget_sink() { sink_ = &null_metrics(); }
 
  private:
+  // With mutex_ held.
+  void count_living(const CellBase& cell, int change) {
+    const auto kind = kind_of(cell.name());
+    const int now = living_by_kind_[std::string(kind)] += change;
+    metrics().set("darm_actors", now, {{"actor", kind}});
+  }
   void work_failed(const char* owner, const std::string& what) {
     failed(supervisor_->policy_of(owner), Failure{owner, "work", what});
   }
@@ -99,6 +107,7 @@ class ThreadedSystem::Core final : public Host, public Executor {
   std::condition_variable nobody_left_;
   bool closing_ = false;
   std::map<const CellBase*, std::shared_ptr<CellBase>> living_;
+  std::map<std::string, int> living_by_kind_;
   // Last, so that no thread outlives what it uses; `timer_` and `pool_` may schedule turns, so they are made around
   // them.
   TimerThread timer_;

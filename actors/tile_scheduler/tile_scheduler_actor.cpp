@@ -75,9 +75,10 @@ void TileSchedulerActor::on(SessionClosed&& message) {
   const auto it = sessions_.find(message.session);
   if (it == sessions_.end()) return;
   const auto stream = it->second->stream_id;
+  const auto encoder = it->second->encoder;
   sessions_.erase(it);
   peers_->set_receivers(stream, {});
-  peers_->destroy_encoder(stream);
+  peers_->destroy_encoder(stream, encoder);
   send_work();  // what only this session saw is no longer shaded
 }
 
@@ -221,6 +222,10 @@ void TileSchedulerActor::send_work() {
 
 void TileSchedulerActor::compose(Session& session) {
   const auto started = now_us();
+  if (session.asked_at == 0) session.asked_at = started;
+  const bool first = session.stream.last_frame() == 0;
+  const bool nothing_yet = session.demand.granted.tiles.empty() && !session.demand.target.tiles.empty();
+  if (first && nothing_yet && started - session.asked_at < options_.first_frame_wait) return;
   const float error = view_error(session.demand, images(), options_.coarse_error);
   auto step = session.stream.step(session.demand.granted.tiles, images(), error, started);
   for (const auto& answer : step.no_change)

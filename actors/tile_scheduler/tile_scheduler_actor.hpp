@@ -30,6 +30,8 @@ struct SchedulerOptions {
   float coarse_error = 0.25f;            ///< display error assumed of what CoarseTex serves
   /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.
   Microseconds reweigh_interval = 1'000'000;
+  /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.
+  Microseconds first_frame_wait = 300'000;
   WorkingSetOptions working_set;
   AllocationOptions allocation;
   StreamOptions stream;
@@ -40,7 +42,8 @@ struct Peers {
   std::function<runtime::Ref<renderer::Inbox>()> renderer;
   /// Makes the encoder actor of a stream; also called again where the old one no longer takes messages.
   std::function<runtime::Ref<encoder::Inbox>(StreamId, const StreamFormat&)> make_encoder;
-  std::function<void(StreamId)> destroy_encoder;
+  /// Ends the encoder actor that make_encoder gave.
+  std::function<void(StreamId, const runtime::Ref<encoder::Inbox>&)> destroy_encoder;
   /// Who gets the frames of a stream; empty before the stream is destroyed.
   std::function<void(StreamId, std::vector<SessionId>)> set_receivers;
   std::shared_ptr<runtime::Registry<SessionId, session::Inbox>> sessions;
@@ -79,6 +82,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
     int updates_waited = 0;
+    Microseconds asked_at = 0;    // for the first pictures
     Microseconds weighed_at = 0;  // of demand.target
     bool pictures_since = false;  // some came after that
     Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}

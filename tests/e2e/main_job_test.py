@@ -65,6 +65,8 @@ class MainJob(unittest.TestCase):
         opened = lambda: self.daemon.messages().count(": opened")
         closed = lambda: self.daemon.messages().count(": closed")
         wait_until(lambda: opened() > 0 and opened() == closed(), 20, "every opened session closed")
+        for kind in ("session", "encoder"):
+            wait_until(lambda: self.metric('darm_actors{actor="%s"}' % kind) == 0, 20, f"every {kind} gone")
 
     def test_a_stranger_hears_one_clear_error(self):
         error = probe(1, self.out, "--seconds", "1", check=False)

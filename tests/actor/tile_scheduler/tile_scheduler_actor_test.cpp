@@ -57,19 +57,24 @@ class FakeSession : public runtime::Actor<session::Inbox> {
 
 class TileScheduler : public ::testing::Test {
  protected:
-  TileScheduler() : world_(testing::make_room()), peers_(std::make_shared<Peers>()) {
+  explicit TileScheduler(Microseconds first_frame_wait = 0)
+      : world_(testing::make_room()), peers_(std::make_shared<Peers>()) {
     renderer_ = system_.spawn<FakeRenderer>("renderer", 16, &heard_);
     peers_->renderer = [this] { return renderer_; };
     peers_->make_encoder = [this](StreamId id, const StreamFormat&) {
       heard_.encoders.insert(id);
       return system_.spawn<FakeEncoder>("encoder/" + std::to_string(static_cast<unsigned>(id)), 16, &heard_, id);
     };
-    peers_->destroy_encoder = [this](StreamId id) { heard_.encoders.erase(id); };
+    peers_->destroy_encoder = [this](StreamId id, const runtime::Ref<encoder::Inbox>& encoder) {
+      heard_.encoders.erase(id);
+      system_.stop(encoder);
+    };
     peers_->set_receivers = [this](StreamId id, std::vector<SessionId> who) { heard_.receivers[id] = std::move(who); };
     peers_->sessions = std::make_shared<runtime::Registry<SessionId, session::Inbox>>();
     std::shared_ptr<const Peers> peers = peers_;
-    scheduler_ =
-        system_.spawn<TileSchedulerActor>("tile_scheduler", 256, world_.layout, world_.rays, peers, SchedulerOptions());
+    SchedulerOptions options;
+    options.first_frame_wait = first_frame_wait;
+    scheduler_ = system_.spawn<TileSchedulerActor>("tile_scheduler", 256, world_.layout, world_.rays, peers, options);
     system_.run_until_idle();
   }
 
@@ -133,6 +138,30 @@ TEST_F(TileScheduler, AnswersACameraWithWorkForTheRendererAndAKeyFrame) {
   ASSERT_EQ(frame.answers.size(), 1u);
   EXPECT_EQ(frame.answers[0].sequence, 1u);
   EXPECT_EQ(frame.answers[0].session, ann_);
+}
+
+class PatientTileScheduler : public TileScheduler {
+ protected:
+  PatientTileScheduler() : TileScheduler(SchedulerOptions().first_frame_wait) {}
+};
+
+TEST_F(PatientTileScheduler, TheFirstFrameHoldsThePicturesThatCameSoon) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  EXPECT_TRUE(heard_.frames[first_].empty());
+  shade_all(1);
+  tick();
+  ASSERT_EQ(heard_.frames[first_].size(), 1u);
+  EXPECT_TRUE(heard_.frames[first_].back().key);
+  EXPECT_FALSE(heard_.frames[first_].back().writes.empty());
+}
+
+TEST_F(PatientTileScheduler, TheFirstFrameDoesNotWaitLongForPictures) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  for (int i = 0; i < 4; ++i) tick();
+  ASSERT_EQ(heard_.frames[first_].size(), 1u);
+  EXPECT_EQ(heard_.frames[first_].back().answers.size(), 1u);
 }
 
 TEST_F(TileScheduler, SendsTilesOnceTheyHavePictures) {
