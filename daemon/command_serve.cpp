@@ -89,7 +89,10 @@ int run(const ServeCommand& command) {
   notifier.ready(line);
 
   const auto interval = notifier.watchdog_interval().value_or(1s);
-  const std::string why = stop.wait(interval, [&notifier] { notifier.watchdog(); });
+  const std::string why = stop.wait(interval, [&] {
+    notifier.watchdog();
+    daemon.report_store();
+  });
   if (stop.failed()) {
     spdlog::error("stopping: {}", why);
   } else {

@@ -33,6 +33,10 @@ class Daemon {
   /// whose failure the daemon cannot survive has failed; it should lead to stop().
   [[nodiscard]] Result<Addresses> start(std::function<void(const std::string&)> on_fatal);
 
+  /// Says in the log, once each, what an operator should know of the radiance store: that it is full, that tiles of it
+  /// were refused. Call it every second or so.
+  void report_store();
+
   /// Refuses new clients, says goodbye, finishes slices, writes the store, joins. Returns false if something was late:
   /// the process should then leave by std::_Exit.
   [[nodiscard]] bool stop(std::chrono::milliseconds deadline);

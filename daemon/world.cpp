@@ -94,8 +94,17 @@ Result<World> build_world(const config::Config& config, unsigned threads) {
                                           *world.layout, {config.state.max_store_bytes});
   if (!store) return std::unexpected(store.error());
   world.store = std::move(*store);
-  if (!world.store->refused_reason().empty()) spdlog::warn("radiance store: {}", world.store->refused_reason());
-  spdlog::info("radiance store: {} tiles in {}", world.store->counters().tiles, world.store->path().string());
+  const auto path = world.store->path().string();
+  const auto stored = world.store->counters();
+  if (!world.store->refused_reason().empty())
+    spdlog::warn("radiance store: {}: {}; a new one is begun, the old one kept as {}.refused", path,
+                 world.store->refused_reason(), path);
+  if (stored.bad_entries > 0)
+    spdlog::warn("radiance store: {}: {} tiles refused: the file is damaged or cut off", path, stored.bad_entries);
+  if (stored.bytes > config.state.max_store_bytes)
+    spdlog::warn("radiance store: {}: its {} bytes are over state.max_store_bytes = {}; it is used and does not grow",
+                 path, stored.bytes, config.state.max_store_bytes);
+  spdlog::info("radiance store: {} tiles in {}", stored.tiles, path);
   return world;
 }
 

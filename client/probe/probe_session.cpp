@@ -63,7 +63,8 @@ bool Run::finished() const {
   if (first_image_us_ == 0) return elapsed() >= plan_.seconds + (walking ? 60 : 0);
   const double since = walking ? static_cast<double>(now_us() - first_image_us_) / 1e6 : elapsed();
   if (since >= plan_.seconds) return true;
-  return plan_.until_error && report_.frames > 0 && report_.answers > 0 && report_.error <= *plan_.until_error;
+  return plan_.until_error && report_.frames > 0 && report_.answers > 0 && report_.error &&
+         *report_.error <= *plan_.until_error;
 }
 
 Result<void> Run::begin_scene(const wire::SceneManifest& manifest) {
@@ -214,7 +215,7 @@ Result<void> Run::note_series() {
 Result<void> Run::draw_if_due() {
   if (!scene_ || !scene_->complete() || !player_->has_coarse()) return {};
   if (first_image_us_ == 0) {
-    if (!picture_new_) return {};
+    if (!picture_new_ || report_.frames == 0) return {};  // CoarseTex alone is not what the server has to show
     if (auto ok = draw(); !ok) return ok;
     const double drawn_at = elapsed();
     const auto counts = renderer_->count_residency(*scene_, view_now());
@@ -251,11 +252,13 @@ std::string Run::not_ready() const {
   if (!scene_) return "no scene came";
   if (!scene_->complete()) return fmt::format("{} geometry chunks came, not all", scene_->chunks().size());
   if (!player_->has_coarse()) return "no CoarseTex came";
-  return "some pixels had no light";
+  return report_.frames == 0 ? "no frame came" : "some pixels had no light";
 }
 
 Result<void> Run::finish(unsigned bench_draws) {
-  if (first_image_us_ == 0) return fail(fmt::format("no full image in {:.1f} s: {}", elapsed(), not_ready()));
+  if (first_image_us_ == 0)
+    return fail(fmt::format("no full image in {:.1f} s: {}; a slow machine or link needs more --seconds", elapsed(),
+                            not_ready()));
   if (auto ok = draw(); !ok) return ok;
   if (auto ok = note_series(); !ok) return ok;
   report_.seconds = elapsed();

@@ -33,7 +33,7 @@ struct SessionPlan {
 struct SeriesPoint {
   double t = 0;
   std::optional<double> psnr;
-  double error = 0;  ///< the server's estimate at that time
+  std::optional<double> error;  ///< the server's estimate at that time, if it has sent one
 };
 
 struct SessionReport {
@@ -46,7 +46,7 @@ struct SessionReport {
   double stream_seconds = 0;  ///< from the first image on
   std::uint64_t stream_bytes_after_first_image = 0;
   std::uint64_t frames = 0, key_frames = 0, no_changes = 0, answers = 0, cameras = 0, frames_lost = 0;
-  double error = 0;
+  std::optional<double> error;  ///< the server's newest estimate
   std::vector<SeriesPoint> series;
   std::map<std::string, std::vector<double>> latency_ms;
   std::vector<double> draw_seconds;  ///< drawing and resolving, without reading back

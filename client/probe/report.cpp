@@ -48,7 +48,7 @@ std::string to_json(const Outcome& o) {
   j["codec_psnr"] = o.codec ? Json(o.codec->psnr) : Json(nullptr);
   j["codec_tiles"] = o.codec ? Json(o.codec->tiles) : Json(nullptr);
   j["rmse"] = o.score ? Json(o.score->rmse) : Json(nullptr);
-  j["error"] = s.error;
+  j["error"] = optional(s.error);
   j["seconds_to_first_image"] = s.seconds_to_first_image;
   j["bytes_to_first_image"] = s.bytes_to_first_image;
   j["sharp_fraction"] = share(s.residency.sharp, s.residency.samples);
@@ -77,7 +77,8 @@ std::string to_json(const Outcome& o) {
     latency[stage] = {{"p50", percentile(values, 0.5)}, {"p99", percentile(values, 0.99)}};
   j["latency_ms"] = latency;
   j["series"] = Json::array();
-  for (const auto& p : s.series) j["series"].push_back({{"t", p.t}, {"psnr", optional(p.psnr)}, {"error", p.error}});
+  for (const auto& p : s.series)
+    j["series"].push_back({{"t", p.t}, {"psnr", optional(p.psnr)}, {"error", optional(p.error)}});
   return j.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -90,9 +91,9 @@ std::string to_text(const Outcome& o) {
   if (!text.empty()) text += "\n";
   text += fmt::format(
       "first full image after {:.2f} s and {:.2f} MB; {} frames, {} without change, {:.2f} Mbit/s, estimated error "
-      "{:.4f}\n",
+      "{}\n",
       s.seconds_to_first_image, static_cast<double>(s.bytes_to_first_image) / 1e6, s.frames, s.no_changes,
-      mbit_per_second(s), s.error);
+      mbit_per_second(s), s.error ? fmt::format("{:.4f}", *s.error) : "not told");
   text += fmt::format("sharp {:.1f} %, coarser {:.1f} %, CoarseTex {:.1f} %, background {:.1f} %\n",
                       100 * share(s.residency.sharp, s.residency.samples),
                       100 * share(s.residency.coarser, s.residency.samples),

@@ -63,7 +63,8 @@ TEST_F(ChainLossTest, IsTheSquaredDifferenceToTheSharpPicture) {
   CoarseLuma coarse{4, 4, std::vector<std::uint8_t>(16, 120)};
   const auto loss = measure({chain_of(0)}, grid(0), &coarse);
   ASSERT_EQ(loss.size(), 1u);
-  for (int i = 0; i < 4; ++i) EXPECT_NEAR(loss[0][static_cast<std::size_t>(i)], 9.0f * i * i, 1e-3f);
+  for (int i = 0; i < 4; ++i)
+    EXPECT_NEAR(loss[0][static_cast<std::size_t>(i)], 9.0f * static_cast<float>(i * i), 1e-3f);
   EXPECT_NEAR(loss[0][kServedByCoarse], 400 + LossOptions{}.coarse_error, 1e-3f);
 }
 
