@@ -146,7 +146,7 @@ void TileSchedulerActor::on(Tick&&) {
 int TileSchedulerActor::passes_due(Session& session, bool moved) const {
   if (moved) return options_.passes_moving;
   const int done = session.set.passes();
-  const bool unlit = !session.demand.complete && done >= options_.passes_unlit;
+  const bool unlit = session.demand.lit < options_.lit && done >= options_.passes_unlit;
   if (unlit && ++session.updates_waited < options_.updates_unlit) return 0;
   session.updates_waited = 0;
   return std::min(options_.passes_still, kAllPasses - done);

@@ -24,7 +24,8 @@ struct SchedulerOptions {
   double updates_per_second = 10;        ///< 0.1..1000: traces, allocations and frames per session
   int passes_moving = 1;                 ///< visibility passes in the first update of a new pose, 1..64
   int passes_still = 1;                  ///< and in each further one, until kAllPasses are done
-  int passes_unlit = 4;                  ///< while pictures are missing, passes after these come
+  float lit = 0.8f;                      ///< while pictures of less than this share of a view are there,
+  int passes_unlit = 4;                  ///< passes after these come
   int updates_unlit = 4;                 ///< in one of so many updates: the same cores make the pictures
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
   float coarse_error = 0.25f;            ///< display error assumed of what CoarseTex serves

@@ -116,8 +116,16 @@ ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const P
 void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
                      const AllocationOptions& options) {
   const auto& tiles = demand.target.tiles;
-  demand.complete = std::all_of(tiles.begin(), tiles.end(), [&](TileId t) { return has_image(images, t); });
-  if (demand.complete) {
+  double all = 0, lit = 0;
+  bool complete = true;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const bool has = has_image(images, tiles[i]);
+    complete = complete && has;
+    all += double(demand.target.weights[i]);
+    if (has) lit += double(demand.target.weights[i]);
+  }
+  demand.lit = all > 0 ? static_cast<float>(lit / all) : 0.0f;
+  if (complete) {
     demand.granted = demand.target;
     return;
   }

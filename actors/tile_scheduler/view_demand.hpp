@@ -16,7 +16,7 @@ namespace darm::tile_scheduler {
 /// What a view asks for, newest allocation.
 struct ViewDemand {
   std::vector<WeightedChain> chains;
-  bool complete = false;                        ///< every tile of the target has a picture
+  float lit = 0;                                ///< share of what the target serves whose tiles have pictures, 0..1
   bool crowded = false;                         ///< the sharp tiles do not all fit: what coarser ones lose decides
   std::vector<ChainLoss> losses;                ///< measured if crowded and there are pictures, else empty
   Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded

@@ -42,10 +42,13 @@ for view in "${views[@]}"; do
     "$bin/darm-probe" --server "127.0.0.1:$port" --setup "config/scenes/$scene.toml" --camera "$camera" --size 1280x720 \
       --reference "$reference.pfm" --out "$out/$scene-$camera-$1.png" --json "${@:2}" > "$out/$scene-$camera-$1.json"
   }
-  probe main --seconds "${SECONDS_EACH:-60}" --codec-check --ceiling-seconds "${CEILING:-15}"
-  probe 1024 --lossless --phystex 1024 --seconds 9 --series-interval 1000
+  probe main --seconds "${SECONDS_EACH:-60}" --ceiling-seconds "${CEILING:-15}"
+  # Few slots are judged by what converged light would show: the coarser tiles that now matter are lit first.
+  probe 1024 --lossless --phystex 1024 --seconds "${FEW_SLOTS:-25}" --series-interval 1000
   probe 2048 --lossless --phystex 2048 --seconds 8 --series-interval 1000
   probe unlimited --lossless --phystex 8192 --seconds 6 --series-interval 1000
+  # Last, when light changes least: the check compares two sessions.
+  probe codec --seconds "${CODEC:-8}" --series-interval 1000 ${CODEC_CHECK---codec-check}
   kill "$daemon"
   wait "$daemon" || true
   python3 - "$out" "$scene" "$camera" <<'PY'
@@ -53,8 +56,9 @@ import json, sys
 out, scene, camera = sys.argv[1:]
 load = lambda kind: json.load(open(f"{out}/{scene}-{camera}-{kind}.json"))
 main, slots = load("main"), [load(kind)["psnr"] for kind in ("unlimited", "2048", "1024")]
+codec = load("codec").get("codec_psnr") or float("nan")
 print(f"{scene} {camera}: {main['psnr']:.2f} dB {main['mssim']:.3f}, ceiling {main['ceiling_psnr']:.2f} "
-      f"{main['ceiling_mssim']:.3f}, reference {main['reference_psnr']:.1f}, codec {main['codec_psnr']:.1f}; "
+      f"{main['ceiling_mssim']:.3f}, reference {main['reference_psnr']:.1f}, codec {codec:.1f}; "
       f"slots unlimited {slots[0]:.2f}, 4096 {slots[1]:.2f}, 1024 {slots[2]:.2f}")
 PY
 done
