@@ -213,7 +213,7 @@ Result<Addresses> Daemon::Parts::listen() {
   return addresses;
 }
 
-Result<Addresses> Daemon::start(std::function<void(const std::string&)> on_fatal) {
+Result<Addresses> Daemon::start(const std::function<void(const std::string&)>& on_fatal) {
   auto& parts = *parts_;
   parts.health.emplace(parts.metrics, "0.1.0");
   if (parts.config.listen.metrics_port >= 0) {

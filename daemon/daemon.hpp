@@ -31,7 +31,7 @@ class Daemon {
 
   /// Loads the world, spawns the actors and opens the listeners. `on_fatal` is called, from any thread, when an actor
   /// whose failure the daemon cannot survive has failed; it should lead to stop().
-  [[nodiscard]] Result<Addresses> start(std::function<void(const std::string&)> on_fatal);
+  [[nodiscard]] Result<Addresses> start(const std::function<void(const std::string&)>& on_fatal);
 
   /// Says in the log, once each, what an operator should know of the radiance store: that it is full, that tiles of it
   /// were refused. Call it every second or so.
