@@ -3,7 +3,8 @@
 # radiance store. usage: tests/bench/nine_views.sh SCENES_DIR OUT_DIR [SCENE:FILE:CAMERA ...]
 #   SCENES_DIR  holds sponza.glb, sibenik.glb and quake_oacmpdm10.glb
 #   OUT_DIR     gets pictures, reports (*.json) and references (made once: SPP samples a pixel, 64 unless set)
-# Q=128 sets the density; SECONDS_EACH=60 and CEILING=15 the time of a view and of its ceiling.
+# Needs codec_bench (ninja -C build/release codec_bench). Q=128 sets the density; SECONDS_EACH=60 and CEILING=15 the time
+# of a view and of its ceiling.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 bin=build/release/bin
@@ -47,16 +48,17 @@ for view in "${views[@]}"; do
   probe 1024 --lossless --phystex 1024 --seconds "${FEW_SLOTS:-25}" --series-interval 1000
   probe 2048 --lossless --phystex 2048 --seconds 8 --series-interval 1000
   probe unlimited --lossless --phystex 8192 --seconds 6 --series-interval 1000
-  # Last, when light changes least: the check compares two sessions.
-  probe codec --seconds "${CODEC:-8}" --series-interval 1000 ${CODEC_CHECK---codec-check}
   kill "$daemon"
   wait "$daemon" || true
+  # On the light that is now in the store: two sessions of a running daemon would differ by the light between them.
+  "$bin/codec_bench" "config/scenes/$scene.toml" "$scenes/$file.glb" "$camera" "$state" "${Q:-64}" \
+    > "$out/$scene-$camera-codec.json"
   python3 - "$out" "$scene" "$camera" <<'PY'
 import json, sys
 out, scene, camera = sys.argv[1:]
 load = lambda kind: json.load(open(f"{out}/{scene}-{camera}-{kind}.json"))
 main, slots = load("main"), [load(kind)["psnr"] for kind in ("unlimited", "2048", "1024")]
-codec = load("codec").get("codec_psnr") or float("nan")
+codec = load("codec")["settled"]["rgb"]
 print(f"{scene} {camera}: {main['psnr']:.2f} dB {main['mssim']:.3f}, ceiling {main['ceiling_psnr']:.2f} "
       f"{main['ceiling_mssim']:.3f}, reference {main['reference_psnr']:.1f}, codec {codec:.1f}; "
       f"slots unlimited {slots[0]:.2f}, 4096 {slots[1]:.2f}, 1024 {slots[2]:.2f}")

@@ -11,31 +11,21 @@
 #include <cstdlib>
 #include <ctime>
 #include <string>
-#include <unordered_map>
 
-#include "actors/atlas/parallel.hpp"
-#include "actors/renderer/texel_shading.hpp"
-#include "actors/renderer/tile_display.hpp"
-#include "actors/renderer/tile_surface_scene.hpp"
-#include "actors/tile_scheduler/image_store.hpp"
 #include "actors/tile_scheduler/texel_taps.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
-#include "actors/tile_scheduler/view_job.hpp"
 #include "actors/tile_scheduler/visibility.hpp"
 #include "client/core/image_metrics.hpp"
 #include "client/core/scene_model.hpp"
-#include "daemon/config/load.hpp"
-#include "daemon/scene_setup.hpp"
-#include "daemon/world.hpp"
+#include "tests/bench/lit_view.hpp"
 
 namespace {
 
 using namespace darm;
+using namespace darm::bench;
 using namespace darm::tile_scheduler;
 
-constexpr Viewport kViewport{1280, 720};
 constexpr std::size_t kSamplesPerPixel = kClientSamples.size();
-constexpr unsigned kThreads = 2;
 constexpr std::uint32_t kSky = ChainIndex::kAbsent;
 
 // Where one client sample looks: the slot of each position of its chain, then that of the coarse level.
@@ -45,30 +35,16 @@ struct Look {
   std::array<glm::vec2, kChainLength + 1> at{};
 };
 
-struct View {
-  World world;
-  WorkingSet set;
-  std::vector<WeightedChain> chains;
+struct View : LitView {
   std::vector<Look> looks;  // kSamplesPerPixel a pixel
-  ImageStore images{std::size_t{8} << 30};
 };
 
-void trace_working_set(View& view, const Camera& camera) {
-  for (int pass = 0; pass < kAllPasses; ++pass) {
-    ViewJob job(1, view.world.layout, view.world.rays, camera, kViewport, pass, 1, kThreads);
-    atlas::parallel_for(kThreads, kThreads, [&](std::size_t s) { job.run_slice(static_cast<unsigned>(s)); });
-    for (const auto& part : job.results()) view.set.add(part, 0);
-    view.set.add(VisibleSet(), 1);
-  }
-  view.chains = view.set.chains();
-}
-
-void trace_looks(View& view, const Camera& camera) {
+void trace_looks(View& view) {
   const auto& layout = *view.world.layout;
   ChainIndex numbers;
   for (const auto& c : view.chains) numbers.insert(c.chain);
   view.looks.resize(std::size_t{kViewport.width} * kViewport.height * kSamplesPerPixel);
-  const ViewSampler sampler(layout, *view.world.rays, camera, kViewport);
+  const ViewSampler sampler(layout, *view.world.rays, view.camera, kViewport);
   const auto look = [&](const SurfaceSample& sample, Look& out) {
     out.chain = numbers.find(chain_of(layout, sample));
     for (int i = 0; i <= kChainLength; ++i) {
@@ -89,44 +65,6 @@ void trace_looks(View& view, const Camera& camera) {
                           surfaces) > 0)
           look(surfaces[0], view.looks[(y * kViewport.width + x) * kSamplesPerPixel + k]);
   });
-}
-
-// Lights and draws every tile that some sample may be drawn from.
-void light(View& view, std::uint32_t samples) {
-  std::unordered_map<TileId, TexelMask> masks;
-  view.set.for_each_use([&](TileId tile, const TileUse& use) {
-    auto& mask = masks[tile];
-    mask |= use.sharp;
-    mask |= use.fallback;
-    mask |= use.border;
-  });
-  for (const auto& l : view.looks)
-    if (l.chain != kSky) masks[l.tiles[kChainLength]] = TexelMask::all();
-  const std::vector<std::pair<TileId, TexelMask>> tiles(masks.begin(), masks.end());
-  const auto surfaces = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport);
-  const auto levels = renderer::level_tiles_of(*view.world.layout);
-  const auto level_of = [&](std::size_t i) { return levels[static_cast<std::size_t>(tiles[i].first.level())]; };
-  auto& store = *view.world.store;
-  renderer::TileFactsCache facts(tiles.size() + 16);
-  atlas::parallel_for(tiles.size(), kThreads, [&](std::size_t i) {
-    const renderer::trace::DenormalsAreZero denormals;
-    const auto& [tile, mask] = tiles[i];
-    const auto surface = surfaces->tile(tile);
-    if (!surface) return;
-    for (std::uint32_t n = 0; n < samples; n += 8)
-      if (!renderer::shade_tile(store, tile, mask, 8, *surface, samples)) return;
-    if (const auto known = facts.get(tile, level_of(i), *surfaces, store);
-        known && known->learn_albedo(*surface, mask, 8))
-      if (auto update = store.begin_update(tile)) update->put_albedo(known->albedo_means);
-  });
-  std::vector<ShadedTile> shaded(tiles.size());
-  atlas::parallel_for(tiles.size(), kThreads, [&](std::size_t i) {
-    renderer::TileDisplay display(store, facts, {view.world.exposure});
-    shaded[i].tile = tiles[i].first;
-    shaded[i].version = 1;
-    if (auto picture = display.draw(tiles[i].first, level_of(i), tiles[i].second)) shaded[i].image = picture->image;
-  });
-  for (const auto& s : shaded) view.images.put(s);
 }
 
 CoarseLuma coarse_luma(const View& view) {
@@ -247,25 +185,19 @@ Result<void> report(View& view, const std::string& camera, const client::Referen
 }
 
 Result<void> run(char** argv) {
-  auto loaded = config::load(std::vector<std::filesystem::path>{argv[1]});
-  if (!loaded) return fail(config::to_string(loaded.error()));
-  loaded->scene.file = argv[2];
-  loaded->state.dir = argv[4];
-  loaded->scene.q = std::strtod(argv[5], nullptr);
   auto a = client::read_pfm(std::string(argv[7]) + ".a.pfm");
   auto b = client::read_pfm(std::string(argv[7]) + ".b.pfm");
   if (!a || !b) return fail(std::string(argv[7]) + ": its halves cannot be read: " + (a ? b : a).error().message);
   if (a->width != kViewport.width || a->height != kViewport.height || b->rgb.size() != a->rgb.size())
     return fail(std::string(argv[7]) + ": is not 1280x720");
   View view;
-  auto world = build_world(*loaded, kThreads);
-  if (!world) return std::unexpected(world.error());
-  view.world = std::move(*world);
-  const auto camera = find_camera(*loaded, *view.world.scene, argv[3]);
-  if (!camera) return std::unexpected(camera.error());
-  trace_working_set(view, *camera);
-  trace_looks(view, *camera);
-  light(view, static_cast<std::uint32_t>(std::strtoul(argv[6], nullptr, 10)));
+  if (auto opened = open_view(view, argv[1], argv[2], argv[3], argv[4], std::strtod(argv[5], nullptr)); !opened)
+    return opened;
+  trace_looks(view);
+  auto masks = wanted_texels(view);
+  for (const auto& l : view.looks)
+    if (l.chain != kSky) masks[l.tiles[kChainLength]] = TexelMask::all();
+  light(view, masks, static_cast<std::uint32_t>(std::strtoul(argv[6], nullptr, 10)));
   return report(view, argv[3], {std::move(*a), std::move(*b)});
 }
 

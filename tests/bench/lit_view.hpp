@@ -1,0 +1,104 @@
+// A still view of a scene and the pictures of its tiles, made in one process by the same functions as `darmd serve`.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "actors/atlas/parallel.hpp"
+#include "actors/renderer/texel_shading.hpp"
+#include "actors/renderer/tile_display.hpp"
+#include "actors/renderer/tile_surface_scene.hpp"
+#include "actors/tile_scheduler/image_store.hpp"
+#include "actors/tile_scheduler/view_job.hpp"
+#include "actors/tile_scheduler/working_set.hpp"
+#include "daemon/config/load.hpp"
+#include "daemon/scene_setup.hpp"
+#include "daemon/world.hpp"
+
+namespace darm::bench {
+
+inline constexpr Viewport kViewport{1280, 720};
+inline constexpr unsigned kThreads = 2;
+
+struct LitView {
+  config::Config config;
+  World world;
+  Camera camera;
+  tile_scheduler::WorkingSet set;
+  std::vector<tile_scheduler::WeightedChain> chains;
+  tile_scheduler::ImageStore images{std::size_t{8} << 30};
+};
+
+using TileMasks = std::unordered_map<TileId, TexelMask>;
+
+/// Loads scene, atlas and store (created in `state_dir` if it is not there); the working set is traced, nothing is lit.
+inline Result<void> open_view(LitView& view, const char* setup, const char* scene, const char* camera,
+                              const char* state_dir, double q) {
+  auto loaded = config::load(std::vector<std::filesystem::path>{setup});
+  if (!loaded) return fail(config::to_string(loaded.error()));
+  view.config = std::move(*loaded);
+  view.config.scene.file = scene;
+  view.config.state.dir = state_dir;
+  view.config.scene.q = q;
+  auto world = build_world(view.config, kThreads);
+  if (!world) return std::unexpected(world.error());
+  view.world = std::move(*world);
+  const auto found = find_camera(view.config, *view.world.scene, camera);
+  if (!found) return std::unexpected(found.error());
+  view.camera = *found;
+  for (int pass = 0; pass < tile_scheduler::kAllPasses; ++pass) {
+    tile_scheduler::ViewJob job(1, view.world.layout, view.world.rays, view.camera, kViewport, pass, 1, kThreads);
+    atlas::parallel_for(kThreads, kThreads, [&](std::size_t s) { job.run_slice(static_cast<unsigned>(s)); });
+    for (const auto& part : job.results()) view.set.add(part, 0);
+    view.set.add(tile_scheduler::VisibleSet(), 1);
+  }
+  view.chains = view.set.chains();
+  return {};
+}
+
+/// What a daemon lights for this view: sharp texels, those of coarser tiles that may stand in, and borders.
+inline TileMasks wanted_texels(const LitView& view) {
+  TileMasks masks;
+  view.set.for_each_use([&](TileId tile, const tile_scheduler::TileUse& use) {
+    auto& mask = masks[tile];
+    mask |= use.sharp;
+    mask |= use.fallback;
+    mask |= use.border;
+  });
+  return masks;
+}
+
+/// Brings every texel to `samples` (0: what the store has) and draws the tiles into `view.images`.
+inline void light(LitView& view, const TileMasks& masks, std::uint32_t samples) {
+  const std::vector<std::pair<TileId, TexelMask>> tiles(masks.begin(), masks.end());
+  const auto surfaces = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport);
+  const auto levels = renderer::level_tiles_of(*view.world.layout);
+  const auto level_of = [&](std::size_t i) { return levels[static_cast<std::size_t>(tiles[i].first.level())]; };
+  auto& store = *view.world.store;
+  renderer::TileFactsCache facts(tiles.size() + 16);
+  atlas::parallel_for(tiles.size(), kThreads, [&](std::size_t i) {
+    const renderer::trace::DenormalsAreZero denormals;
+    const auto& [tile, mask] = tiles[i];
+    const auto surface = surfaces->tile(tile);
+    if (!surface) return;
+    for (std::uint32_t n = 0; n < samples; n += 8)
+      if (!renderer::shade_tile(store, tile, mask, 8, *surface, samples)) return;
+    if (const auto known = facts.get(tile, level_of(i), *surfaces, store);
+        known && known->learn_albedo(*surface, mask, 8))
+      if (auto update = store.begin_update(tile)) update->put_albedo(known->albedo_means);
+  });
+  std::vector<tile_scheduler::ShadedTile> shaded(tiles.size());
+  atlas::parallel_for(tiles.size(), kThreads, [&](std::size_t i) {
+    renderer::TileDisplay display(store, facts, {view.world.exposure});
+    shaded[i].tile = tiles[i].first;
+    shaded[i].version = 1;
+    if (auto picture = display.draw(tiles[i].first, level_of(i), tiles[i].second)) shaded[i].image = picture->image;
+  });
+  for (const auto& s : shaded)
+    if (s.image) view.images.put(s);
+}
+
+}  // namespace darm::bench
