@@ -82,9 +82,8 @@ CoarseLuma coarse_luma(const View& view) {
 
 // Colour of a look at position `position` or the next coarser one with a picture, display RGB 0..1.
 glm::vec3 colour(const View& view, const Look& look, std::size_t position) {
-  const StoredImage* stored = nullptr;
-  for (; position <= kChainLength; ++position)
-    if ((stored = view.images.find(look.tiles[position])) != nullptr) break;
+  const StoredImage* stored = view.images.find(look.tiles[position]);
+  while (stored == nullptr && position < kChainLength) stored = view.images.find(look.tiles[++position]);
   if (stored == nullptr) return glm::vec3(0.5f);
   const glm::vec2 at = glm::clamp(look.at[position] - 0.5f, 0.0f, float{kSlotSize - 1});
   const int x = std::min(static_cast<int>(at.x), kSlotSize - 2), y = std::min(static_cast<int>(at.y), kSlotSize - 2);
