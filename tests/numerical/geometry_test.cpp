@@ -1,8 +1,10 @@
 // Shapes that break parameterisations, and scenes at the ends of the scale, against areas and positions in double.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
+#include <sstream>
 #include <string>
 
 #include "actors/atlas/flatten.hpp"

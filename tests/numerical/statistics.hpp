@@ -1,6 +1,7 @@
 // Estimates with their own error, and chi-square: what the statistical tests judge by.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
