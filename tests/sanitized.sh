@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Tests under sanitizers. usage: tests/sanitized.sh build|run asan|tsan
-#   asan: address and undefined behaviour, all unit and actor tests and a second of libFuzzer per parser
+#   asan: address and undefined behaviour, all unit, actor and numerical tests and a second of libFuzzer per parser
 #   tsan: data races, in every test that starts threads of ours and needs no minutes of compiling for it
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 step=$1
 preset=$2
 case "$preset" in
-  asan) tests='^(unit|actor|fuzz)_' ;;
+  asan) tests='^(unit|actor|numerical|fuzz)_' ;;
   tsan) tests='^(unit_runtime|unit_observe|unit_lifecycle|unit_client|unit_radiance_store|actor_runtime|actor_encoder|integration_session)$' ;;
   *) echo "sanitized.sh: unknown preset $preset" >&2; exit 2 ;;
 esac

@@ -11,7 +11,7 @@
 namespace darm::atlas {
 
 /// Bumped whenever the same scene would be packed in another way: old caches are then refused.
-inline constexpr std::uint32_t kPackerVersion = 2;
+inline constexpr std::uint32_t kPackerVersion = 3;
 
 /// Patches in the order in which the packer fills the strip, in groups that are seen together (near in space, alike in
 /// direction). Shared by all levels.

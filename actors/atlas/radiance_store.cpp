@@ -77,9 +77,13 @@ bool TexelBatch::add(const glm::vec3& radiance) {
   const glm::dvec3 c(radiance);
   const bool sane = std::abs(c.x) <= kBrightest && std::abs(c.y) <= kBrightest && std::abs(c.z) <= kBrightest;
   if (!sane) return false;  // NaN compares false as well
+  // Youngs & Cramer 1971: deviations, not squares, whose difference says nothing where the mean is large.
+  if (count > 0) {
+    const double n = count;
+    const double delta = luminance(c) - luminance(sum) / n;
+    luminance_m2 += delta * delta * n / (n + 1);
+  }
   sum += c;
-  const double y = luminance(c);
-  luminance_squares += y * y;
   ++count;
   return true;
 }
@@ -402,15 +406,13 @@ void RadianceStore::Update::merge(int texel, Layer layer, const TexelBatch& batc
   const glm::dvec3 old_mean(p[0], p[kTileTexels], p[2 * kTileTexels]);
   const glm::dvec3 batch_mean = batch.sum / added;
   const glm::dvec3 step = (batch_mean - old_mean) * (added / all);
-  const double batch_luminance = luminance(batch_mean);
-  const double batch_m2 = std::max(0.0, batch.luminance_squares - batch_luminance * batch_luminance * added);
-  const double delta = batch_luminance - luminance(old_mean);
+  const double delta = luminance(batch_mean) - luminance(old_mean);
   p[0] = static_cast<float>(old_mean.x + step.x);
   p[kTileTexels] = static_cast<float>(old_mean.y + step.y);
   p[2 * kTileTexels] = static_cast<float>(old_mean.z + step.z);
   p[3 * kTileTexels] = static_cast<float>(std::min(all, 16777216.0));
-  p[4 * kTileTexels] =
-      static_cast<float>(std::min(1e38, p[4 * kTileTexels] + batch_m2 + delta * delta * before * added / all));
+  p[4 * kTileTexels] = static_cast<float>(
+      std::min(1e38, p[4 * kTileTexels] + batch.luminance_m2 + delta * delta * before * added / all));
 }
 
 RadianceStore::Update::~Update() {

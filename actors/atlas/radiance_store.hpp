@@ -43,7 +43,7 @@ enum class Layer : int { kSharp = 0, kSoft = 5 };
 /// Samples of one texel and layer, summed in double before they are merged into the store.
 struct TexelBatch {
   glm::dvec3 sum{0.0};
-  double luminance_squares = 0;
+  double luminance_m2 = 0;  ///< sum of squared deviations from the mean
   std::uint32_t count = 0;
 
   /// Adds a sample; false (and nothing changed) if it is NaN, infinite or beyond any light there is (1e15 nits).

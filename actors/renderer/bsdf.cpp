@@ -40,7 +40,10 @@ Bsdf::Bsdf(const trace::Surface& surface, const MaterialPoint& material, const g
   const float specular = luminance(reflectance(wo_.z));
   const float diffuse = dielectric * (1.0f - material.transmission) * base;
   const bool lobe = material.transmission > 0 && !material.passes_straight();
-  const float transmit = lobe ? dielectric * material.transmission * base : 0.0f;
+  // Inside a body the whole surface may reflect totally where its tilted microfacets do not: what they let through
+  // needs a chance that grows with their spread.
+  const float let_through = (1.0f - material.metallic) * std::max(1.0f - f, std::min(material.ggx_alpha, 0.5f));
+  const float transmit = lobe ? let_through * material.transmission * base : 0.0f;
   const float sum = specular + diffuse + transmit;
   if (!(sum > 1e-8f)) return;
   specular_probability_ = specular / sum;

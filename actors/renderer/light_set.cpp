@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "actors/renderer/material_point.hpp"
 #include "actors/renderer/sampler.hpp"
@@ -11,9 +12,10 @@
 namespace darm::renderer {
 namespace {
 
-constexpr float kNearestSquare = 1e-8f;  // a point light is no nearer than 0.1 mm: its irradiance stays finite
-constexpr float kCosineFloor = 0.05f;    // keeps lights reachable that only a bent normal or a glossy lobe sees
-constexpr float kSmallestDisc = 1e-5f;   // radians; below, a sun is a delta light
+constexpr float kNearest = 1e-4f;         // a point light is no nearer than 0.1 mm: its irradiance stays finite
+constexpr float kNearestOfScene = 1e-5f;  // nor than this share of the scene where that is less: models may be small
+constexpr float kCosineFloor = 0.05f;     // keeps lights reachable that only a bent normal or a glossy lobe sees
+constexpr float kSmallestDisc = 1e-5f;    // radians; below, a sun is a delta light
 
 // Square root within 4 %: drawing a light needs a weight, not an exact one, and integers vectorise.
 float rough_sqrt(float x) { return std::bit_cast<float>((std::bit_cast<std::int32_t>(x) >> 1) + 0x1fbd1df5); }
@@ -35,6 +37,9 @@ SunLight make_sun(const scene::Light& light) {
 }  // namespace
 
 LightSet::LightSet(const trace::RayScene& rays) : rays_(rays) {
+  const float extent = glm::length(rays.scene().bounds_max - rays.scene().bounds_min);
+  const float nearest = extent > 0 ? std::min(kNearest, kNearestOfScene * extent) : kNearest;
+  nearest_square_ = std::max(nearest * nearest, std::numeric_limits<float>::min());
   std::vector<double> powers;
   for (const auto& light : rays.scene().lights) {
     const float power = luminance(light.intensity);
@@ -102,9 +107,9 @@ void LightSet::add_emitters(const trace::RayScene& rays, std::uint32_t instance,
   }
 }
 
-glm::vec3 LightSet::arriving(const Punctual& light, const glm::vec3& position) {
+glm::vec3 LightSet::arriving(const Punctual& light, const glm::vec3& position) const {
   const glm::vec3 to = light.position - position;
-  const float square = std::max(glm::dot(to, to), kNearestSquare);
+  const float square = std::max(glm::dot(to, to), nearest_square_);
   float factor = 1.0f / square;
   if (light.inverse_range2 > 0) {
     const float r2 = square * light.inverse_range2;
@@ -122,7 +127,7 @@ float LightSet::weigh_punctual(const glm::vec3& position, const glm::vec3& norma
     const float x = punctual_x_[i] - position.x;
     const float y = punctual_y_[i] - position.y;
     const float z = punctual_z_[i] - position.z;
-    const float square = x * x + y * y + z * z + kNearestSquare;
+    const float square = x * x + y * y + z * z + nearest_square_;
     const float length = rough_sqrt(square);
     const float along = x * normal.x + y * normal.y + z * normal.z;
     const float cosine = (along > 0 ? along : -along * behind) + kCosineFloor * length;

@@ -85,9 +85,10 @@ class LightSet {
   };
 
   void add_emitters(const trace::RayScene& rays, std::uint32_t instance, std::vector<double>& power);
-  [[nodiscard]] static glm::vec3 arriving(const Punctual& light, const glm::vec3& position);
+  [[nodiscard]] glm::vec3 arriving(const Punctual& light, const glm::vec3& position) const;
 
   const trace::RayScene& rays_;
+  float nearest_square_ = 0;  // squared distance below which a point light shines no brighter
   std::vector<SunLight> suns_;
   std::vector<Punctual> punctual_;
   std::vector<float> punctual_x_, punctual_y_, punctual_z_, punctual_power_;  // for the loop over all lights

@@ -9,19 +9,40 @@ namespace {
 constexpr int kReach = 2;
 constexpr float kFewNeighbours = 4;  // samples; fewer say nothing about what is usual
 
-// Mean of the other texels' samples around `at`; negative if there are too few.
-float usual_around(const FilterWindow& w, const std::vector<float>& grey, int x, int y) {
-  const auto at = static_cast<std::size_t>(y * w.size + x);
-  float samples = 0;
-  float sum = 0;
-  for (int v = std::max(0, y - kReach); v <= std::min(w.size - 1, y + kReach); ++v)
-    for (int u = std::max(0, x - kReach); u <= std::min(w.size - 1, x + kReach); ++u) {
-      const auto other = static_cast<std::size_t>(v * w.size + u);
-      if (other == at || w.patch[other] != w.patch[at]) continue;
-      samples += w.count[other];
-      sum += w.count[other] * grey[other];
+// What the other texels of its patch within reach have, for every texel. One offset at a time over whole rows: such
+// loops vectorise, so that no texel needs to be left out for the sake of time.
+struct Around {
+  std::vector<float> samples;
+  std::vector<float> sum;  // of samples times grey
+};
+
+void add_offset(const FilterWindow& w, int du, int dv, Around& around) {
+  const int begin = std::max(0, -du);
+  const auto length = static_cast<std::size_t>(std::min(w.size, w.size - du) - begin);
+  for (int y = std::max(0, -dv); y < std::min(w.size, w.size - dv); ++y) {
+    const auto own = static_cast<std::size_t>(y * w.size + begin);
+    const auto other = static_cast<std::size_t>((y + dv) * w.size + begin + du);
+    const std::uint32_t* patch = w.patch.data() + own;
+    const std::uint32_t* other_patch = w.patch.data() + other;
+    const float* count = w.count.data() + other;
+    const float* grey = w.grey.data() + other;
+    float* samples = around.samples.data() + own;
+    float* sum = around.sum.data() + own;
+    for (std::size_t i = 0; i < length; ++i) {
+      const float all = count[i];  // read always, or the loop does not vectorise
+      const float same = other_patch[i] == patch[i] ? all : 0.0f;
+      samples[i] += same;
+      sum[i] += same * grey[i];
     }
-  return samples < kFewNeighbours ? -1.0f : sum / samples;
+  }
+}
+
+Around look_around(const FilterWindow& w) {
+  Around around{std::vector<float>(w.grey.size()), std::vector<float>(w.grey.size())};
+  for (int dv = -kReach; dv <= kReach; ++dv)
+    for (int du = -kReach; du <= kReach; ++du)
+      if (du != 0 || dv != 0) add_offset(w, du, dv, around);
+  return around;
 }
 
 }  // namespace
@@ -29,28 +50,16 @@ float usual_around(const FilterWindow& w, const std::vector<float>& grey, int x,
 float outlier_bound(float count) { return 2.0f + count / 8.0f; }
 
 void tame_outliers(FilterWindow& w) {
-  const std::vector<float> grey = w.grey;  // judged by what was measured, not by what was tamed
-  double samples = 0;
-  double sum = 0;
-  for (std::size_t at = 0; at < grey.size(); ++at) {
-    samples += w.count[at];
-    sum += double{w.count[at]} * grey[at];
+  const Around around = look_around(w);  // judged by what was measured, not by what was tamed
+  for (std::size_t at = 0; at < w.grey.size(); ++at) {
+    if (w.count[at] <= 0 || w.count[at] >= kOutlierSamples || around.samples[at] < kFewNeighbours) continue;
+    const float bound = around.sum[at] / around.samples[at] * outlier_bound(w.count[at]);
+    if (w.grey[at] <= bound) continue;
+    const float scale = bound / w.grey[at];  // grey > bound >= 0
+    for (auto& channel : w.irradiance) channel[at] *= scale;
+    w.grey[at] *= scale;
+    w.grey_m2[at] *= scale * scale;
   }
-  if (samples <= 0) return;
-  // Most texels are below the window's mean and need no look around them.
-  const auto suspicious = static_cast<float>(sum / samples);
-  for (int y = 0; y < w.size; ++y)
-    for (int x = 0; x < w.size; ++x) {
-      const auto at = static_cast<std::size_t>(y * w.size + x);
-      if (w.count[at] <= 0 || w.count[at] >= kOutlierSamples || grey[at] <= suspicious) continue;
-      const float usual = usual_around(w, grey, x, y);
-      const float bound = usual * outlier_bound(w.count[at]);
-      if (usual < 0 || grey[at] <= bound) continue;
-      const float scale = bound / grey[at];  // grey > bound >= 0
-      for (auto& channel : w.irradiance) channel[at] *= scale;
-      w.grey[at] *= scale;
-      w.grey_m2[at] *= scale * scale;
-    }
 }
 
 }  // namespace darm::renderer

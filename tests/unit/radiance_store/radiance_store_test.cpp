@@ -112,19 +112,6 @@ TEST_F(RadianceStoreTest, second_moment_and_mean_are_those_of_all_samples_in_any
   }
 }
 
-TEST_F(RadianceStoreTest, ten_million_equal_samples_stay_exact) {
-  auto store = open();
-  auto update = store->begin_update(TileId(0, 0));
-  ASSERT_TRUE(update);
-  const glm::vec3 value(0.1f, 1234.567f, 3e-7f);
-  TexelBatch b;
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(b.add(value));
-  for (int i = 0; i < 100'000; ++i) update->merge(5, Layer::kSharp, b);
-  EXPECT_EQ(update->view().mean(Layer::kSharp, 5), value);
-  EXPECT_EQ(update->view().count(Layer::kSharp, 5), 1e7f);
-  EXPECT_LT(std::sqrt(update->view().variance_of_mean(Layer::kSharp, 5, 1e9f)), 1e-4f);
-}
-
 TEST_F(RadianceStoreTest, samples_that_are_no_light_are_refused) {
   TexelBatch b;
   EXPECT_FALSE(b.add({std::nanf(""), 0, 0}));
