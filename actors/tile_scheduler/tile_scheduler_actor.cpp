@@ -19,6 +19,17 @@ bool same_view(const ViewChanged& a, const ViewChanged& b) {
          a.viewport.height == b.viewport.height;
 }
 
+// One step of a slice. The next one waits behind those of other views, so that a small view need not wait for a large
+// one.
+void post_step(runtime::Executor& executor, std::shared_ptr<ViewJob> job, unsigned slice,
+               runtime::Ref<tile_scheduler::Inbox> scheduler) {
+  executor.post(runtime::Priority::kHigh, [&executor, job = std::move(job), slice, scheduler = std::move(scheduler)] {
+    const auto step = job->run_step(slice);
+    if (step == ViewJob::Step::kMore) post_step(executor, job, slice, scheduler);
+    if (step == ViewJob::Step::kAllDone) scheduler.tell(ViewTraced(job->number()));
+  });
+}
+
 ViewAnswer answer_to(const ViewChanged& view) {
   ViewAnswer answer;
   answer.session = view.session;
@@ -181,17 +192,14 @@ void TileSchedulerActor::start_view(Session& session) {
 }
 
 void TileSchedulerActor::post_slices(const std::shared_ptr<ViewJob>& job) {
-  for (unsigned slice = 0; slice < job->slice_count(); ++slice)
-    executor().post(runtime::Priority::kHigh, [job, slice, ref = self()] {
-      if (job->run_slice(slice)) ref.tell(ViewTraced(job->number()));
-    });
+  for (unsigned slice = 0; slice < job->slice_count(); ++slice) post_step(executor(), job, slice, self());
 }
 
 void TileSchedulerActor::finish_view(Session& session) {
   const auto job = std::exchange(session.job, nullptr);
   const auto traced = now_us();
   metrics_.observe("darm_view_trace_seconds", double(traced - job->answer.stamps.view_started) * 1e-6);
-  if (job->starts_pose) session.set.start_pose(traced);
+  if (job->starts_pose) session.set.start_pose(traced, passes_per_picture(session.posed->viewport));
   for (const auto& part : job->results()) session.set.add(part, 0);
   session.set.add(VisibleSet(), job->pass_count());
   reallocate(session);

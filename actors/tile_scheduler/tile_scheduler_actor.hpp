@@ -87,6 +87,11 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     Microseconds weighed_at = 0;  // of demand.target
     bool pictures_since = false;  // some came after that
     Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
+    ~Session() {
+      if (job) job->cancel();  // it goes with the session, and with the scheduler
+    }
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
   };
 
   [[nodiscard]] ImageLookup images() const;
