@@ -105,8 +105,19 @@ void TileSchedulerActor::on(ViewChanged&& message) {
 void TileSchedulerActor::on(KeyFrameWanted&& message) {
   auto* session = find(message.session);
   if (session == nullptr) return;
-  session->stream.want_key();
-  if (session->set.passes() > 0) compose(*session);
+  force_key(*session);
+  if (session->key_put_off)
+    metrics_.count("darm_key_frames_put_off_total", 1);
+  else if (session->set.passes() > 0)
+    compose(*session);
+}
+
+// Makes the session's next frame a key frame, unless it had one on demand just now: then a later tick does.
+void TileSchedulerActor::force_key(Session& session) {
+  session.key_put_off = session.key_forced_at && now_us() - *session.key_forced_at < options_.key_interval;
+  if (session.key_put_off) return;
+  session.key_forced_at = now_us();
+  session.stream.want_key();
 }
 
 void TileSchedulerActor::on(TilesShaded&& message) {
@@ -147,6 +158,7 @@ void TileSchedulerActor::on(Tick&&) {
     } else if (pictures_came_ && session->set.passes() > 0) {
       grant_available(session->demand, layout_->coarse_level(), session->stream.table(), images(), options_.allocation);
     }
+    if (session->key_put_off) force_key(*session);
     start_view(*session);
     if (session->set.passes() > 0) compose(*session);
   }

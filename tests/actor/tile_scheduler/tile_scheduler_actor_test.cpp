@@ -286,6 +286,29 @@ TEST_F(TileScheduler, AKeyFrameHoldsTheWholeTable) {
   EXPECT_EQ(key.writes.size(), key.edits.size());
 }
 
+TEST_F(TileScheduler, AClientMayForceTwoKeyFramesASecond) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  finish_frame(first_);
+  tick();
+  const auto keys_in = [&](int requests) {
+    std::size_t keys = 0;
+    for (int i = 0; i < requests; ++i) {
+      const auto before = heard_.frames[first_].size();
+      scheduler_.tell(KeyFrameWanted(ann_));
+      system_.advance(10ms);
+      if (heard_.frames[first_].size() == before) continue;
+      keys += heard_.frames[first_].back().key ? 1 : 0;
+      finish_frame(first_);
+    }
+    return keys;
+  };
+  EXPECT_EQ(keys_in(30), 1u) << "0.3 s";
+  const auto keys = keys_in(300);
+  EXPECT_GE(keys, 5u) << "3 s: put off, not refused";
+  EXPECT_LE(keys, 7u);
+}
+
 TEST_F(TileScheduler, JoinsTheWorkOfAllSessionsAndForgetsAClosedOne) {
   const SessionId bob{2};
   open(ann_);
