@@ -17,6 +17,7 @@
 #include <shared_mutex>
 #include <unordered_map>
 #include <variant>
+#include <vector>
 
 namespace darm::observe {
 namespace {
@@ -49,6 +50,17 @@ struct TextHash {
   using is_transparent = void;
   std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
 };
+
+// A scrape takes one request and milliseconds. Who connects and says nothing holds a thread until the timeout, so there
+// are some to spare, and none is kept for a second request.
+constexpr const char* kThreads = "8";
+constexpr const char* kRequestTimeoutMs = "2000";
+
+std::unique_ptr<prometheus::Exposer> make_exposer(const std::string& where) {
+  return std::make_unique<prometheus::Exposer>(std::vector<std::string>{"listening_ports", where, "num_threads",
+                                                                        kThreads, "request_timeout_ms",
+                                                                        kRequestTimeoutMs, "enable_keep_alive", "no"});
+}
 
 // civetweb's listening_ports: an IPv6 address is written in brackets.
 std::string bind_address(const std::string& address, std::uint16_t port) {
@@ -124,15 +136,18 @@ PrometheusSink::~PrometheusSink() = default;
 Result<void> PrometheusSink::expose(const std::string& address, std::uint16_t port) {
   const std::string where = bind_address(address, port);
   try {
-    auto exposer = std::make_unique<prometheus::Exposer>(where, 2);
+    auto exposer = make_exposer(where);
     exposer->RegisterCollectable(impl_->shared_registry());
     const auto ports = exposer->GetListeningPorts();
     if (ports.empty() || ports.front() <= 0) return fail(where + ": metrics cannot be served there");
     impl_->port = static_cast<std::uint16_t>(ports.front());
     impl_->exposer = std::move(exposer);
     return {};
-  } catch (const std::exception&) {
-    return fail(where + ": metrics cannot be served there; is the port taken? set listen.metrics_port (-1: off)");
+  } catch (const std::exception& e) {
+    return fail(
+        fmt::format("{}: metrics cannot be served there; is the port taken? set listen.metrics_port (-1: off) "
+                    "({})",
+                    where, e.what()));
   }
 }
 

@@ -1,5 +1,6 @@
 """Clients that keep to the protocol's letter and ask for all they can: the others go on, and the daemon stops in time."""
 import math
+import signal
 import socket
 import struct
 import threading
@@ -7,7 +8,7 @@ import time
 import unittest
 from pathlib import Path
 
-from running import Daemon, Folder, probe
+from running import Daemon, Folder, probe, wait_until
 
 HELLO, CAMERA = 1, 2
 
@@ -89,6 +90,21 @@ class RudeClients(unittest.TestCase):
             self.assertEqual(code, 0)
             self.assertLess(report["seconds_to_first_image"], 3)
             self.assertLess(stopped, 3)
+
+    def test_who_connects_to_the_metrics_and_says_nothing_does_not_hold_up_the_stop(self):
+        with Folder() as folder:
+            daemon = Daemon(Path(folder) / "state")
+            self.addCleanup(daemon.process.kill)
+            idle = [socket.create_connection(("127.0.0.1", daemon.metrics)) for _ in range(10)]
+            time.sleep(0.2)
+            start = time.monotonic()
+            daemon.process.send_signal(signal.SIGTERM)
+            wait_until(lambda: "stopped" in daemon.messages(), 10, "stopped")
+            daemon.process.wait(timeout=0.5)  # what has said so is gone
+            self.assertEqual(daemon.stop(), 0)
+            self.assertLess(time.monotonic() - start, 5)
+            for one in idle:
+                one.close()
 
 
 if __name__ == "__main__":
