@@ -57,10 +57,10 @@ class StopRequest {
 };
 
 std::string ready_line(const config::Config& config, const Addresses& at) {
-  std::string line =
-      "ready: tcp " + config.listen.address + ":" + std::to_string(at.tcp) + ", udp port " + std::to_string(at.udp);
-  if (at.metrics != 0)
-    line += ", metrics http://" + config.listen.address + ":" + std::to_string(at.metrics) + "/metrics";
+  const auto& address = config.listen.address;
+  const std::string host = address.find(':') == std::string::npos ? address : "[" + address + "]";
+  std::string line = "ready: tcp " + host + ":" + std::to_string(at.tcp) + ", udp port " + std::to_string(at.udp);
+  if (!at.metrics_url.empty()) line += ", metrics " + at.metrics_url;
   return line;
 }
 

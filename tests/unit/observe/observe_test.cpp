@@ -101,6 +101,22 @@ TEST(PrometheusSinkTest, ServesOverHttpOnAnyFreePort) {
   EXPECT_TRUE(has(answer, "darm_build_info{version=\"1.2.3\"} 1")) << answer;
 }
 
+TEST(PrometheusSinkTest, AnyAndLoopbackOfIpv6AreServedOneWayOrTheOther) {
+  for (const char* address : {"::", "::1"}) {
+    PrometheusSink sink;
+    const auto exposed = sink.expose(address, 0);
+    ASSERT_TRUE(exposed) << exposed.error().message;
+    EXPECT_TRUE(has(sink.url(), std::to_string(sink.port()).append("/metrics"))) << sink.url();
+    if (has(sink.url(), "[")) continue;  // a build with IPv6
+    EXPECT_TRUE(has(fetch(sink.port()), "200 OK")) << sink.url();
+  }
+  const auto elsewhere = PrometheusSink().expose("2001:db8::1", 0);
+  ASSERT_FALSE(elsewhere);
+  EXPECT_TRUE(has(elsewhere.error().message, "[2001:db8::1]:0")) << elsewhere.error().message;
+  EXPECT_TRUE(has(elsewhere.error().message, "built without IPv6")) << elsewhere.error().message;
+  EXPECT_TRUE(has(elsewhere.error().message, "CivetServer")) << "the reason as it was given";
+}
+
 TEST(PrometheusSinkTest, WhoConnectsAndSaysNothingKeepsNobodyOut) {
   auto sink = std::make_unique<PrometheusSink>();
   ASSERT_TRUE(sink->expose("127.0.0.1", 0));
