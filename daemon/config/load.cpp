@@ -160,6 +160,7 @@ void apply(std::string_view toml, const std::filesystem::path& file, Config& con
 std::expected<std::string, std::string> read_file(const std::filesystem::path& file) {
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
+  if (std::filesystem::is_directory(status)) return std::unexpected("is a directory; name the TOML file in it");
   if (error || !std::filesystem::is_regular_file(status)) return std::unexpected("cannot be read: no such file");
   const auto size = std::filesystem::file_size(file, error);
   if (error) return std::unexpected("cannot be read: " + error.message());

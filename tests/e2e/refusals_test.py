@@ -6,6 +6,7 @@ from pathlib import Path
 
 from running import BIN, SET_UP
 
+SERVE = ["darmd", "serve"]
 RENDER = ["darmd", "render", "--config", SET_UP, "--camera", "hall", "--out", "x.png"]
 PROBE = ["darm-probe", "--server", "127.0.0.1:1"]
 CAMERA = ["--camera", "0,1,0 1,1,0 60"]
@@ -39,6 +40,25 @@ class Refusals(unittest.TestCase):
             (PROBE + CAMERA + ["--until-error", "nan"], "--until-error"),
             (PROBE + CAMERA + ["--size", "4294967297x10"], "--size"),
             (PROBE + CAMERA + ["--size", "10x-4294967290"], "--size"),
+        ])
+
+    def test_cameras(self):
+        for more in ([], ["--setup", SET_UP]):
+            self.check([
+                (PROBE + ["--camera", "1e300,0,0 1,1,1 60", *more], "within 1e7"),
+                (PROBE + ["--camera", "1e999,0,0 1,1,1 60", *more], "within 1e7"),
+                (PROBE + ["--camera", "nan,0,0 1,1,1 60", *more], "finite"),
+                (PROBE + ["--camera", "0,0,0 1,1,1 nan", *more], "field of view"),
+            ])
+
+    def test_places(self):
+        self.check([
+            (PROBE + CAMERA + ["--out", "missing/x.png"], "folder missing does not exist"),
+            (SERVE + ["--state-dir", ""], "--state-dir"),
+            (SERVE + ["--scene", ""], "--scene"),
+            (SERVE + ["--config", SET_UP.parent], "is a directory"),
+            (SERVE + ["--config", ""], "--config"),
+            (SERVE + ["--http-port", "8080"], "no web client yet"),
         ])
 
 
