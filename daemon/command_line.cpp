@@ -1,6 +1,9 @@
 #include "daemon/command_line.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cstdio>
 #include <utility>
 
@@ -8,6 +11,24 @@
 
 namespace darm {
 namespace {
+
+/// A finite number from `low` to `high`, or 0 where that means automatic. CLI::Range lets NaN through, and takes 0 and
+/// the smallest doubles for one range.
+CLI::Validator number(double low, double high, bool or_zero) {
+  const auto range = fmt::format("{}{} to {}", or_zero ? "0 or " : "", low, high);
+  return {[low, high, or_zero, range](std::string& text) {
+            double value = 0;
+            const char* last = text.data() + text.size();
+            const auto [end, error] = std::from_chars(text.data(), last, value);
+            const bool in_range = (value >= low && value <= high) || (or_zero && value == 0);  // false for NaN
+            return error == std::errc() && end == last && in_range ? std::string()
+                                                                   : "'" + text + "' is not a number, " + range;
+          },
+          range};
+}
+
+const CLI::Validator kNotEmpty(
+    [](std::string& text) { return text.empty() ? std::string("must not be empty") : std::string(); }, "");
 
 /// Options that every subcommand has, and the overrides they ask for.
 struct Common {
@@ -20,12 +41,14 @@ struct Common {
   bool json = false;
 
   void add_to(CLI::App& app, bool scene_is_positional) {
-    app.add_option("--config", config_files, "TOML file; may be given several times, a later one overrides");
-    app.add_option(scene_is_positional ? "scene,--scene" : "--scene", scene, "glTF or GLB file to load");
-    app.add_option("--state-dir", state_dir, "folder of caches and radiance store");
-    app.add_option("--q", q, "texels per metre of level 0 (0: automatic)")->check(CLI::Range(0.0, 65536.0));
+    app.add_option("--config", config_files, "TOML file; may be given several times, a later one overrides")
+        ->check(kNotEmpty);
+    app.add_option(scene_is_positional ? "scene,--scene" : "--scene", scene, "glTF or GLB file to load")
+        ->check(kNotEmpty);
+    app.add_option("--state-dir", state_dir, "folder of caches and radiance store")->check(kNotEmpty);
+    app.add_option("--q", q, "texels per metre of level 0 (0: automatic)")->check(number(0.001, 65536, true));
     app.add_option("--exposure", exposure, "display = sRGB(clamp(exposure * nits)) (0: automatic)")
-        ->check(CLI::Range(0.0, 1e12));
+        ->check(number(1e-12, 1e12, true));
     app.add_option("--threads", threads, "threads for long work (0: one per core)")->check(CLI::Range(0, 1024));
   }
 };
@@ -108,8 +131,7 @@ void add_serve(CLI::App& app, ServeOptions& options) {
   options.common.add_to(app, false);
   app.add_option("--tcp-port", options.tcp_port, "clients connect here (0: any free port)")->check(kPort);
   app.add_option("--udp-port", options.udp_port, "cameras arrive here (0: any free port)")->check(kPort);
-  app.add_option("--http-port", options.http_port, "reserved for the web client: only 0 (off)")
-      ->check(CLI::Range(0, 0));
+  app.add_option("--http-port", options.http_port, "reserved for the web client: only 0 (off)")->check(kPort);
   app.add_option("--metrics-port", options.metrics_port, "Prometheus (0: any free port, -1: off)")
       ->check(CLI::Range(-1, 65535));
   app.add_option("--address", options.address, "address to listen on");
@@ -132,7 +154,7 @@ void add_render(CLI::App& app, RenderCommand& command, Common& common, std::stri
       app.add_option("--spp", command.spp, "samples per pixel, both halves together")->check(CLI::Range(2, 1 << 20));
   auto* psnr =
       app.add_option("--until-psnr", command.until_psnr, "go on until the reference's own PSNR is this many dB")
-          ->check(CLI::Range(1.0, 100.0));
+          ->check(number(1, 100, false));
   app.add_option("--effects", effects, "full or view-independent")->check(CLI::IsMember({"full", "view-independent"}));
   app.add_option("--seed", command.seed, "seed of the sample sequences");
   app.add_option("--out", command.out, "picture (.png); .pfm, .a.pfm, .b.pfm (halves) and .json are written beside it")

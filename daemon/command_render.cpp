@@ -17,15 +17,16 @@ namespace fs = std::filesystem;
 constexpr std::uint32_t kMostSamples = 1u << 20;
 
 /// The sums of a picture outlive the run beside the other caches, so that the same command goes on where it stopped.
-fs::path state_file(const RenderCommand& command, const scene::Scene& scene) {
-  std::string key = command.camera + (command.view_independent ? " view-independent " : " full ") +
-                    std::to_string(command.width) + "x" + std::to_string(command.height) + " " +
-                    std::to_string(command.seed) + " " + std::to_string(command.config.scene.exposure);
-  char name[64];
-  std::snprintf(name, sizeof name, "reference-%016llx-%016zx.bin", static_cast<unsigned long long>(scene.hash),
-                std::hash<std::string>{}(key));
-  return command.config.state.dir / name;
+/// Named by what they depend on, not by the words of the command: a named camera may be moved.
+fs::path state_file(const fs::path& folder, const renderer::LightTransport& transport,
+                    const renderer::ReferenceJob& job) {
+  char name[40];
+  std::snprintf(name, sizeof name, "reference-%016llx.bin",
+                static_cast<unsigned long long>(renderer::reference_hash(transport, job)));
+  return folder / name;
 }
+
+void warn(const std::string& what) { std::fprintf(stderr, "darmd render: warning: %s\n", what.c_str()); }
 
 bool report_progress(const renderer::ReferenceProgress& progress) {
   std::fprintf(stderr, "\rdarmd render: %u of %u samples per pixel, own PSNR %.2f dB, %.0f s ", progress.spp,
@@ -67,7 +68,8 @@ Result<nlohmann::json> render(const RenderCommand& command) {
   job.threads = threads;
   std::error_code made;
   fs::create_directories(command.config.state.dir, made);
-  job.state_file = state_file(command, **scene);
+  job.state_file = state_file(command.config.state.dir, transport, job);
+  job.warn = warn;
   if (!command.json) job.progress = report_progress;
   auto picture = renderer::render_reference(transport, job);
   if (!command.json) std::fprintf(stderr, "\n");

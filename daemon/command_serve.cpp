@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -56,10 +57,10 @@ class StopRequest {
 };
 
 std::string ready_line(const config::Config& config, const Addresses& at) {
-  std::string line =
-      "ready: tcp " + config.listen.address + ":" + std::to_string(at.tcp) + ", udp port " + std::to_string(at.udp);
-  if (at.metrics != 0)
-    line += ", metrics http://" + config.listen.address + ":" + std::to_string(at.metrics) + "/metrics";
+  const auto& address = config.listen.address;
+  const std::string host = address.find(':') == std::string::npos ? address : "[" + address + "]";
+  std::string line = "ready: tcp " + host + ":" + std::to_string(at.tcp) + ", udp port " + std::to_string(at.udp);
+  if (!at.metrics_url.empty()) line += ", metrics " + at.metrics_url;
   return line;
 }
 
@@ -74,12 +75,12 @@ int run(const ServeCommand& command) {
   });
   observe::set_up_log(command.config.log.level, command.config.log.json);
 
-  Daemon daemon(command.config, command.seed);
+  auto daemon = std::make_unique<Daemon>(command.config, command.seed);
   const auto start = std::chrono::steady_clock::now();
-  const auto addresses = daemon.start([&stop](const std::string& why) { stop.ask(why, true); });
+  const auto addresses = daemon->start([&stop](const std::string& why) { stop.ask(why, true); });
   if (!addresses) {
     std::fprintf(stderr, "darmd serve: %s\n", addresses.error().message.c_str());
-    static_cast<void>(daemon.stop(1s));
+    static_cast<void>(daemon->stop(1s));
     return 1;
   }
   const std::string line = ready_line(command.config, *addresses);
@@ -91,7 +92,7 @@ int run(const ServeCommand& command) {
   const auto interval = notifier.watchdog_interval().value_or(1s);
   const std::string why = stop.wait(interval, [&] {
     notifier.watchdog();
-    daemon.report_store();
+    daemon->report_store();
   });
   if (stop.failed()) {
     spdlog::error("stopping: {}", why);
@@ -100,7 +101,8 @@ int run(const ServeCommand& command) {
   }
   notifier.stopping();
   const lifecycle::StopDeadline deadline(kStopTime + 2s, [] { spdlog::error("stop: past the deadline"); });
-  if (!daemon.stop(kStopTime)) std::_Exit(1);
+  if (!daemon->stop(kStopTime)) std::_Exit(1);
+  daemon.reset();  // the metrics too, before the deadline: when "stopped" is said the process is as good as gone
   spdlog::info("stopped");
   return stop.failed() ? 1 : 0;
 }

@@ -184,7 +184,7 @@ void Daemon::Parts::spawn_actors() {
 
 Result<Addresses> Daemon::Parts::listen() {
   Addresses addresses;
-  addresses.metrics = metrics.port();
+  addresses.metrics_url = metrics.url();
   surroundings = std::make_shared<session::SessionSurroundings>();
   surroundings->policy = session_policy(config, *world.scene);
   surroundings->scene = world.geometry;

@@ -18,7 +18,7 @@ namespace darm {
 struct Addresses {
   std::uint16_t tcp = 0;
   std::uint16_t udp = 0;
-  std::uint16_t metrics = 0;  ///< 0: off
+  std::string metrics_url;  ///< empty: off
 };
 
 /// Composition root. start() once, stop() once, from the same thread.

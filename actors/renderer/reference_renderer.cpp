@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "actors/renderer/reference_state.hpp"
@@ -41,7 +43,9 @@ class JobHash {
   std::uint64_t state_ = 0x6461726d72656631ull;
 };
 
-std::uint64_t hash_of(const LightTransport& transport, const ReferenceJob& job) {
+}  // namespace
+
+std::uint64_t reference_hash(const LightTransport& transport, const ReferenceJob& job) {
   JobHash hash;
   const auto& scene = transport.rays().scene();
   hash.add(scene.hash);
@@ -59,6 +63,8 @@ std::uint64_t hash_of(const LightTransport& transport, const ReferenceJob& job) 
   hash.add(job.seed_b);
   return hash.value();
 }
+
+namespace {
 
 void render_row(const LightTransport& transport, const ReferenceJob& job, ReferenceState& state, std::uint32_t y) {
   const glm::vec3 eye(job.camera.position - transport.rays().scene().origin);
@@ -92,6 +98,31 @@ void render_pass(const LightTransport& transport, const ReferenceJob& job, Refer
   ++state.passes;
 }
 
+// What went wrong with the file of the sums is said once: it costs time if the run is cut off, never the picture.
+class StateFile {
+ public:
+  explicit StateFile(const ReferenceJob& job) : job_(job) {}
+
+  void load(ReferenceState& state) {
+    std::error_code error;
+    if (job_.state_file.empty() || !std::filesystem::exists(job_.state_file, error)) return;
+    if (const auto loaded = load_state(job_.state_file, state); !loaded)
+      warn(loaded.error().message + "; the picture is begun anew");
+  }
+  void save(const ReferenceState& state) {
+    if (job_.state_file.empty()) return;
+    if (const auto saved = save_state(job_.state_file, state); !saved)
+      warn(saved.error().message + "; the picture cannot be taken up again later");
+  }
+
+ private:
+  void warn(const std::string& what) {
+    if (!std::exchange(warned_, true) && job_.warn) job_.warn(what);
+  }
+  const ReferenceJob& job_;
+  bool warned_ = false;
+};
+
 // Looking costs a little: eight looks per doubling, at passes that do not depend on where a run began.
 bool is_time_to_look(std::uint32_t passes) { return passes % std::max(1u, std::bit_floor(passes) / 8) == 0; }
 
@@ -113,10 +144,9 @@ Result<ReferencePicture> render_reference(const LightTransport& transport, const
   if (!is_valid(job.camera)) return fail("camera: is not finite or its field of view is out of range");
   if (!is_valid(job.viewport)) return fail("size: must be 1..16384 pixels a side");
   if (!std::isfinite(job.exposure) || job.exposure < 0) return fail("exposure: must be finite and not negative");
-  ReferenceState state(hash_of(transport, job), job.viewport.width, job.viewport.height);
-  const bool resumable = !job.state_file.empty();
-  if (resumable && std::filesystem::exists(job.state_file))
-    if (auto loaded = load_state(job.state_file, state); !loaded) return std::unexpected(loaded.error());
+  ReferenceState state(reference_hash(transport, job), job.viewport.width, job.viewport.height);
+  StateFile file(job);
+  file.load(state);
 
   ReferencePicture made;
   const auto start = Clock::now();
@@ -134,13 +164,12 @@ Result<ReferencePicture> render_reference(const LightTransport& transport, const
       made.stopped = true;
       break;
     }
-    if (resumable && seconds_since(start) - saved_at >= job.save_seconds) {
-      if (auto saved = save_state(job.state_file, state); !saved) return std::unexpected(saved.error());
+    if (seconds_since(start) - saved_at >= job.save_seconds) {
+      file.save(state);
       saved_at = seconds_since(start);
     }
   }
-  if (resumable)
-    if (auto saved = save_state(job.state_file, state); !saved) return std::unexpected(saved.error());
+  file.save(state);
   made.mean = state.picture(2);
   made.half_a = state.picture(0);
   made.half_b = state.picture(1);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "actors/renderer/light_transport.hpp"
 #include "actors/renderer/picture_io.hpp"
@@ -34,6 +35,8 @@ struct ReferenceJob {
   unsigned threads = 1;
   std::filesystem::path state_file;  ///< empty: not resumable. Read at the start if it is there, written as below
   double save_seconds = 20;
+  /// Told, once, that the state file was no use or cannot be written; the picture is made all the same.
+  std::function<void(const std::string&)> warn;
   std::function<bool(const ReferenceProgress&)>
       progress;  ///< after every pass; false: save, stop, return what there is
 };
@@ -52,9 +55,13 @@ struct ReferencePicture {
 /// apart: paths are averaged unclamped in a quarter, the quarter is clamped, the quarters are averaged. What is left of
 /// the bias falls with the number of samples. Pixels of the same quarter and half depend on (seed, pixel, pass) alone:
 /// bits are equal for any number of threads, and for a run that was stopped and resumed.
-/// Errors: an invalid camera or size; a state file of another picture, or a damaged one; a state file that cannot be
-/// written.
+/// A state file of another picture, a damaged one and one that cannot be written are warnings (ReferenceJob::warn): the
+/// first two are written over. Errors: an invalid camera, size or exposure.
 [[nodiscard]] Result<ReferencePicture> render_reference(const LightTransport& transport, const ReferenceJob& job);
+
+/// Names what the sums of a job depend on (scene, camera, size, exposure, effects, seeds), for the name of a state
+/// file: jobs with the same hash are the same picture with more or fewer samples.
+[[nodiscard]] std::uint64_t reference_hash(const LightTransport& transport, const ReferenceJob& job);
 
 /// PSNR in dB of the mean of two independent halves (linear, display-referred, equal sizes), as in ReferencePicture.
 [[nodiscard]] double psnr_of_mean(const Picture& half_a, const Picture& half_b);

@@ -79,14 +79,14 @@ Result<void> save_state(const std::filesystem::path& path, const ReferenceState&
   file.close();
   std::error_code error;
   if (file) std::filesystem::rename(beside, path, error);
-  if (!file || error) return fail(path.string() + ": state cannot be written; check the folder and the free space");
-  return {};
+  if (file && !error) return {};
+  std::error_code ignored;
+  std::filesystem::remove(beside, ignored);
+  return fail(path.string() + ": cannot be written; check the folder and the free space");
 }
 
 Result<void> load_state(const std::filesystem::path& path, ReferenceState& state) {
-  const auto refuse = [&](const char* what) {
-    return fail(path.string() + ": " + what + "; delete it or name another state file");
-  };
+  const auto refuse = [&](const char* what) { return fail(path.string() + ": " + what); };
   std::ifstream file(path, std::ios::binary);
   if (!file) return refuse("cannot be read");
   Header header;

@@ -37,7 +37,8 @@ struct ReferenceState {
   [[nodiscard]] Picture picture(int half) const;
 };
 
-/// Writes beside `path` and renames, so that a reader sees the old state or the new one. Errors: disk.
+/// Writes beside `path` and renames, so that a reader sees the old state or the new one. Errors: disk; nothing is left
+/// beside it.
 [[nodiscard]] Result<void> save_state(const std::filesystem::path& path, const ReferenceState& state);
 /// Fills `state` (made for the job at hand) from `path`. Errors: another job, another size, damage; state is untouched.
 [[nodiscard]] Result<void> load_state(const std::filesystem::path& path, ReferenceState& state);

@@ -19,6 +19,17 @@ bool same_view(const ViewChanged& a, const ViewChanged& b) {
          a.viewport.height == b.viewport.height;
 }
 
+// One step of a slice. The next one waits behind those of other views, so that a small view need not wait for a large
+// one.
+void post_step(runtime::Executor& executor, std::shared_ptr<ViewJob> job, unsigned slice,
+               runtime::Ref<tile_scheduler::Inbox> scheduler) {
+  executor.post(runtime::Priority::kHigh, [&executor, job = std::move(job), slice, scheduler = std::move(scheduler)] {
+    const auto step = job->run_step(slice);
+    if (step == ViewJob::Step::kMore) post_step(executor, job, slice, scheduler);
+    if (step == ViewJob::Step::kAllDone) scheduler.tell(ViewTraced(job->number()));
+  });
+}
+
 ViewAnswer answer_to(const ViewChanged& view) {
   ViewAnswer answer;
   answer.session = view.session;
@@ -94,8 +105,19 @@ void TileSchedulerActor::on(ViewChanged&& message) {
 void TileSchedulerActor::on(KeyFrameWanted&& message) {
   auto* session = find(message.session);
   if (session == nullptr) return;
-  session->stream.want_key();
-  if (session->set.passes() > 0) compose(*session);
+  force_key(*session);
+  if (session->key_put_off)
+    metrics_.count("darm_key_frames_put_off_total", 1);
+  else if (session->set.passes() > 0)
+    compose(*session);
+}
+
+// Makes the session's next frame a key frame, unless it had one on demand just now: then a later tick does.
+void TileSchedulerActor::force_key(Session& session) {
+  session.key_put_off = session.key_forced_at && now_us() - *session.key_forced_at < options_.key_interval;
+  if (session.key_put_off) return;
+  session.key_forced_at = now_us();
+  session.stream.want_key();
 }
 
 void TileSchedulerActor::on(TilesShaded&& message) {
@@ -136,6 +158,7 @@ void TileSchedulerActor::on(Tick&&) {
     } else if (pictures_came_ && session->set.passes() > 0) {
       grant_available(session->demand, layout_->coarse_level(), session->stream.table(), images(), options_.allocation);
     }
+    if (session->key_put_off) force_key(*session);
     start_view(*session);
     if (session->set.passes() > 0) compose(*session);
   }
@@ -181,17 +204,14 @@ void TileSchedulerActor::start_view(Session& session) {
 }
 
 void TileSchedulerActor::post_slices(const std::shared_ptr<ViewJob>& job) {
-  for (unsigned slice = 0; slice < job->slice_count(); ++slice)
-    executor().post(runtime::Priority::kHigh, [job, slice, ref = self()] {
-      if (job->run_slice(slice)) ref.tell(ViewTraced(job->number()));
-    });
+  for (unsigned slice = 0; slice < job->slice_count(); ++slice) post_step(executor(), job, slice, self());
 }
 
 void TileSchedulerActor::finish_view(Session& session) {
   const auto job = std::exchange(session.job, nullptr);
   const auto traced = now_us();
   metrics_.observe("darm_view_trace_seconds", double(traced - job->answer.stamps.view_started) * 1e-6);
-  if (job->starts_pose) session.set.start_pose(traced);
+  if (job->starts_pose) session.set.start_pose(traced, passes_per_picture(session.posed->viewport));
   for (const auto& part : job->results()) session.set.add(part, 0);
   session.set.add(VisibleSet(), job->pass_count());
   reallocate(session);

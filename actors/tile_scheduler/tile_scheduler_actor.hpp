@@ -33,6 +33,8 @@ struct SchedulerOptions {
   Microseconds reweigh_interval = 1'000'000;
   /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.
   Microseconds first_frame_wait = 300'000;
+  /// Least time between key frames that a session asks for: each writes every slot and the whole page table.
+  Microseconds key_interval = 500'000;
   WorkingSetOptions working_set;
   AllocationOptions allocation;
   StreamOptions stream;
@@ -83,10 +85,17 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
     int updates_waited = 0;
-    Microseconds asked_at = 0;    // for the first pictures
+    Microseconds asked_at = 0;  // for the first pictures
+    std::optional<Microseconds> key_forced_at;
+    bool key_put_off = false;     // asked for again too soon after that
     Microseconds weighed_at = 0;  // of demand.target
     bool pictures_since = false;  // some came after that
     Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
+    ~Session() {
+      if (job) job->cancel();  // it goes with the session, and with the scheduler
+    }
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
   };
 
   [[nodiscard]] ImageLookup images() const;
@@ -98,6 +107,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void finish_view(Session& session);
   void reallocate(Session& session);
   void send_work();
+  void force_key(Session& session);
   void compose(Session& session);
   void send_frame(Session& session, encoder::ComposeFrame frame);
 

@@ -11,8 +11,12 @@
 
 namespace darm::tile_scheduler {
 
-/// Owns everything its slices touch. run_slice(i) is called once for each i in [0, slice_count()), in any order and on
-/// any thread; when it returns true, all are done and `results` may be read by whoever learns of it from that call.
+/// A ray with what is noted of it takes about a microsecond.
+inline constexpr std::uint32_t kRaysPerStep = 2048;
+
+/// Owns everything its slices touch. Slices may run on any threads, each on one at a time. run_step(i) is called for
+/// each i in [0, slice_count()) until it says no longer kMore; whoever hears kAllDone, or learns of it from that call,
+/// may read `results`.
 class ViewJob {
  public:
   /// Traces passes [first_pass, first_pass + pass_count) in at most `slices` slices (at least 1).
@@ -20,7 +24,13 @@ class ViewJob {
           std::shared_ptr<const renderer::trace::RayScene> rays, const Camera& camera, const Viewport& viewport,
           int first_pass, int pass_count, unsigned slices);
 
+  enum class Step : std::uint8_t { kMore, kSliceDone, kAllDone };
+  /// Traces a few milliseconds' worth of rows of a slice: at least one, and no more than kRaysPerStep rays with it.
+  Step run_step(unsigned slice);
+  /// The whole of a slice; true: all are done.
   bool run_slice(unsigned slice);
+  /// Nobody waits for the results: steps end at the next row, and slices with them. Thread-safe.
+  void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
 
   [[nodiscard]] std::uint64_t number() const { return number_; }
   [[nodiscard]] unsigned slice_count() const { return static_cast<unsigned>(results_.size()); }
@@ -32,6 +42,13 @@ class ViewJob {
   bool starts_pose = false;  ///< the result belongs to a new pose
 
  private:
+  // Where a slice goes on.
+  struct Place {
+    int pass = 0;
+    std::uint32_t row = 0;
+  };
+  [[nodiscard]] std::uint32_t first_row(unsigned slice) const;
+
   std::uint64_t number_;
   std::shared_ptr<const atlas::Layout> layout_;
   std::shared_ptr<const renderer::trace::RayScene> rays_;
@@ -39,7 +56,9 @@ class ViewJob {
   int first_pass_;
   int pass_count_;
   std::vector<VisibleSet> results_;
+  std::vector<Place> places_;  // of each slice
   std::atomic<unsigned> left_;
+  std::atomic<bool> cancelled_ = false;
 };
 
 }  // namespace darm::tile_scheduler

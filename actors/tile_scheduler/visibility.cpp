@@ -74,8 +74,22 @@ glm::vec2 pass_offset(int pass) {
   return glm::vec2(pixel[0], pixel[1]) + kClientSamples[sample];
 }
 
-std::uint32_t block_rows(const Viewport& viewport) { return (viewport.height + kBlock - 1) / kBlock; }
-std::uint32_t block_columns(const Viewport& viewport) { return (viewport.width + kBlock - 1) / kBlock; }
+float block_side(const Viewport& viewport) {
+  const double pixels = double(viewport.width) * double(viewport.height);
+  return static_cast<float>(std::max(double{kBlock}, std::sqrt(pixels / kMaxRays)));
+}
+
+int passes_per_picture(const Viewport& viewport) {
+  const float side = block_side(viewport);
+  return static_cast<int>(std::ceil(side * side));
+}
+
+std::uint32_t block_rows(const Viewport& viewport) {
+  return static_cast<std::uint32_t>(std::ceil(static_cast<float>(viewport.height) / block_side(viewport)));
+}
+std::uint32_t block_columns(const Viewport& viewport) {
+  return static_cast<std::uint32_t>(std::ceil(static_cast<float>(viewport.width) / block_side(viewport)));
+}
 
 Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample) {
   Chain chain;
@@ -118,19 +132,22 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
                 VisibleSet& out) {
   const renderer::trace::DenormalsAreZero denormals;
   const auto& viewport = sampler.viewport();
-  const glm::vec2 offset = pass_offset(pass);
-  // After k passes a sample stands for a square of kBlock / sqrt(k) pixels a side; the reach is half of it.
-  const float early = pass < kPassesPerPicture ? 0.5f * kBlock / std::sqrt(static_cast<float>(pass + 1)) : 0.0f;
+  const float side = block_side(viewport);
+  const glm::vec2 offset = pass_offset(pass) * (side / kBlock);
+  // After k passes a sample stands for a square of side / sqrt(k) pixels a side; the reach is half of it.
+  const float early =
+      pass < passes_per_picture(viewport) ? 0.5f * side / std::sqrt(static_cast<float>(pass + 1)) : 0.0f;
   const bool note_taps = pass < kTapPasses;
   const auto width = static_cast<float>(viewport.width);
   const auto height = static_cast<float>(viewport.height);
+  const auto columns = block_columns(viewport);
   std::array<SurfaceSample, kMaxLayers> surfaces;
   double samples = 0;
   for (std::uint32_t row = first_row; row < last_row; ++row) {
-    const float y = static_cast<float>(row * kBlock) + offset.y;
+    const float y = static_cast<float>(row) * side + offset.y;
     if (y >= height) break;
-    for (std::uint32_t column = 0; column < block_columns(viewport); ++column) {
-      const float x = static_cast<float>(column * kBlock) + offset.x;
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      const float x = static_cast<float>(column) * side + offset.x;
       if (x >= width) break;
       const int layers = sampler.trace(x, y, surfaces);
       for (int i = 0; i < layers; ++i)

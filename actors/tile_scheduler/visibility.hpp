@@ -10,8 +10,11 @@
 
 namespace darm::tile_scheduler {
 
-/// Pixels per side of the block that one ray of a pass stands for.
+/// Pixels per side of the block that one ray of a pass stands for, in pictures of up to kMaxRays blocks.
 inline constexpr int kBlock = 4;
+/// Rays of a pass, about: blocks of larger pictures (1080p is the largest that fits) grow with them, so that no client
+/// buys more of the processor with a larger viewport. Footprints and levels are those of the real one.
+inline constexpr std::uint32_t kMaxRays = 1u << 17;
 /// Passes after which every pixel has been looked at once, and at all four of the client's sample positions.
 inline constexpr int kPassesPerPicture = kBlock * kBlock;
 inline constexpr int kAllPasses = 4 * kPassesPerPicture;
@@ -26,12 +29,16 @@ inline constexpr std::array<glm::vec2, 4> kClientSamples{
 /// Bayer matrix (any first 2^k passes are spread evenly), each time at another of the client's sample positions.
 [[nodiscard]] glm::vec2 pass_offset(int pass);
 
+/// Pixels per side of this picture's blocks: kBlock, or as much more as keeps it at about kMaxRays blocks.
+[[nodiscard]] float block_side(const Viewport& viewport);
+/// Passes after which there has been one sample per pixel: kPassesPerPicture with blocks of kBlock.
+[[nodiscard]] int passes_per_picture(const Viewport& viewport);
 /// Blocks of a picture; a pass traces one ray per block whose position lies inside the picture.
 [[nodiscard]] std::uint32_t block_rows(const Viewport& viewport);
 [[nodiscard]] std::uint32_t block_columns(const Viewport& viewport);
 
-/// Traces rows [first_row, last_row) of blocks in pass `pass` into `out`. In the first 16 passes each sample also marks
-/// the texels around it that the unseen pixels of its block probably read (TileUse::early).
+/// Traces rows [first_row, last_row) of blocks in pass `pass` into `out`. In the first passes_per_picture() passes each
+/// sample also marks the texels around it that the unseen pixels of its block probably read (TileUse::early).
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out);
 
 /// Chain of a surface sample: its tile at the sharp level and at up to three coarser ones.

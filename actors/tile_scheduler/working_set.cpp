@@ -6,13 +6,16 @@
 
 namespace darm::tile_scheduler {
 
-void WorkingSet::start_pose(Microseconds now) {
+WorkingSet::WorkingSet(WorkingSetOptions options) : options_(options), passes_per_picture_(kPassesPerPicture) {}
+
+void WorkingSet::start_pose(Microseconds now, int passes_per_picture) {
   if (passes_ > 0) {
     previous_ = std::move(current_);
     moved_at_ = now;
   }
   current_.clear();
   passes_ = 0;
+  passes_per_picture_ = passes_per_picture;
 }
 
 void WorkingSet::add(const VisibleSet& samples, int passes) {
@@ -20,7 +23,7 @@ void WorkingSet::add(const VisibleSet& samples, int passes) {
   const int before = passes_;
   passes_ += passes;
   // Once every pixel has been looked at, no more guesses.
-  if (before < kPassesPerPicture && passes_ >= kPassesPerPicture) current_.forget_early();
+  if (before < passes_per_picture_ && passes_ >= passes_per_picture_) current_.forget_early();
 }
 
 bool WorkingSet::expire(Microseconds now) {

@@ -18,10 +18,11 @@ struct WorkingSetOptions {
 /// Accumulates the passes of one session's view. Bounded by VisibleSet's limits, twice.
 class WorkingSet {
  public:
-  explicit WorkingSet(WorkingSetOptions options = {}) : options_(options) {}
+  explicit WorkingSet(WorkingSetOptions options = {});
 
-  /// The camera moved: what follows belongs to a new pose. The old set is kept if the new one has samples.
-  void start_pose(Microseconds now);
+  /// The camera moved: what follows belongs to a new pose. The old set is kept if it has samples. After
+  /// `passes_per_picture` passes every pixel of the new one will have been looked at (see visibility.hpp).
+  void start_pose(Microseconds now, int passes_per_picture);
   /// More samples of the present pose: `passes` whole passes are complete with them (0: part of a pass).
   void add(const VisibleSet& samples, int passes);
   /// Drops the previous pose's set when its time is over. True if it did.
@@ -40,6 +41,7 @@ class WorkingSet {
   VisibleSet previous_;
   Microseconds moved_at_ = 0;
   int passes_ = 0;
+  int passes_per_picture_;
 };
 
 }  // namespace darm::tile_scheduler

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
+#include <system_error>
 
 // toml++ 3.3 takes some malformed keys as failed assertions, and in release builds as undefined behaviour (found by
 // fuzzing). Here they are errors like any other.
@@ -26,30 +29,51 @@ namespace {
 constexpr std::uintmax_t kMaxFileBytes = 16u << 20;
 constexpr std::size_t kMaxKeys = 100000;
 
+constexpr double kFarthest = 1e7;  // metres, as darmd has it
+constexpr const char* kBounds = "position and target must be finite and within 1e7, the field of view 0.1 to 179";
+
+bool near(const glm::dvec3& v) {  // false for NaN
+  return std::abs(v.x) <= kFarthest && std::abs(v.y) <= kFarthest && std::abs(v.z) <= kFarthest;
+}
+
 bool valid(const CameraKey& k) {
-  const double sum = k.t + k.position.x + k.position.y + k.position.z + k.target.x + k.target.y + k.target.z + k.fovy;
-  return std::isfinite(sum) && k.fovy >= 0.1 && k.fovy <= 179;
+  return std::isfinite(k.t) && near(k.position) && near(k.target) && k.fovy >= 0.1 && k.fovy <= 179;
 }
 
-std::optional<glm::dvec3> parse_vec(const std::string& text) {
-  std::istringstream in(text);
+// A number as it is written, be it of use or not: nan, inf, and infinity for what no double holds.
+bool take_number(std::string_view& text, double& out) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+  if (error == std::errc::invalid_argument) return false;
+  if (error == std::errc::result_out_of_range) out = INFINITY;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return true;
+}
+
+bool take(std::string_view& text, char c) {
+  if (text.empty() || text.front() != c) return false;
+  text.remove_prefix(1);
+  return true;
+}
+
+std::optional<glm::dvec3> parse_vec(std::string_view text) {
   glm::dvec3 v;
-  char comma1 = 0, comma2 = 0;
-  if (!(in >> v.x >> comma1 >> v.y >> comma2 >> v.z) || comma1 != ',' || comma2 != ',' || in.peek() != EOF)
-    return std::nullopt;
-  return v;
+  const bool ok = take_number(text, v.x) && take(text, ',') && take_number(text, v.y) && take(text, ',') &&
+                  take_number(text, v.z) && text.empty();
+  return ok ? std::optional(v) : std::nullopt;
 }
 
+// The camera that numbers give, valid or not; nothing if `spec` is no such list of numbers.
 std::optional<CameraKey> parse_spec(const std::string& spec) {
   std::istringstream in(spec);
-  std::string position, target, rest;
+  std::string position, target, fovy, rest;
+  if (!(in >> position >> target >> fovy) || (in >> rest)) return std::nullopt;
   CameraKey key;
-  if (!(in >> position >> target >> key.fovy) || (in >> rest)) return std::nullopt;
+  std::string_view angle = fovy;
   const auto p = parse_vec(position), t = parse_vec(target);
-  if (!p || !t) return std::nullopt;
+  if (!p || !t || !take_number(angle, key.fovy) || !angle.empty()) return std::nullopt;
   key.position = *p;
   key.target = *t;
-  return valid(key) ? std::optional(key) : std::nullopt;
+  return key;
 }
 
 std::optional<glm::dvec3> toml_vec(const toml::table& table, const char* name) {
@@ -67,7 +91,10 @@ std::optional<glm::dvec3> toml_vec(const toml::table& table, const char* name) {
 }  // namespace
 
 Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::path& setup) {
-  if (const auto key = parse_spec(spec)) return *key;
+  if (const auto key = parse_spec(spec)) {
+    if (!valid(*key)) return fail("--camera " + spec + ": " + kBounds);
+    return *key;
+  }
   if (setup.empty())
     return fail("--camera " + spec + ": expected \"px,py,pz tx,ty,tz fovy\", or a name together with --setup FILE");
   toml::table table;
@@ -89,8 +116,8 @@ Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::pa
       const auto position = toml_vec(*camera, "position"), target = toml_vec(*camera, "target");
       const CameraKey key{0, position.value_or(glm::dvec3(0)), target.value_or(glm::dvec3(0)),
                           (*camera)["fovy"].value_or(60.0)};
-      if (!position || !target || !valid(key))
-        return fail(setup.string() + ": camera " + name + " needs position, target and fovy");
+      if (!position || !target) return fail(setup.string() + ": camera " + name + " needs position and target");
+      if (!valid(key)) return fail(setup.string() + ": camera " + name + ": " + kBounds);
       return key;
     }
   }

@@ -2,7 +2,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
+#include <charconv>
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 
@@ -13,6 +14,44 @@
 
 namespace darm::client::probe {
 namespace {
+
+constexpr double kLongest = 1e6;  // seconds
+constexpr unsigned kLargestSide = 8192;
+
+// A finite number from `low` to `high`. CLI::Range lets NaN through.
+CLI::Validator number(double low, double high) {
+  const auto range = fmt::format("{} to {}", low, high);
+  return {[low, high, range](std::string& text) {
+            double value = 0;
+            const char* last = text.data() + text.size();
+            const auto [end, error] = std::from_chars(text.data(), last, value);
+            const bool in_range = value >= low && value <= high;  // false for NaN
+            return error == std::errc() && end == last && in_range ? std::string()
+                                                                   : "'" + text + "' is not a number, " + range;
+          },
+          range};
+}
+
+// Refused before the session, not after.
+const CLI::Validator kWritablePlace(
+    [](std::string& text) {
+      const std::filesystem::path path(text);
+      const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+      std::error_code error;
+      if (text.empty() || std::filesystem::is_directory(path, error)) return "'" + text + "' is not the name of a file";
+      return std::filesystem::is_directory(folder, error) ? std::string()
+                                                          : "folder " + folder.string() + " does not exist";
+    },
+    "FILE");
+
+Result<void> parse_size(const std::string& text, std::uint32_t& width, std::uint32_t& height) {
+  const char* last = text.data() + text.size();
+  const auto w = std::from_chars(text.data(), last, width);
+  const bool wide = w.ec == std::errc() && w.ptr != last && *w.ptr == 'x' && width >= 1 && width <= kLargestSide;
+  const auto h = wide ? std::from_chars(w.ptr + 1, last, height) : w;
+  if (wide && h.ec == std::errc() && h.ptr == last && height >= 1 && height <= kLargestSide) return {};
+  return fail(fmt::format("--size {}: expected WIDTHxHEIGHT, 1 to {} each", text, kLargestSide));
+}
 
 struct Arguments {
   std::string server, camera, setup, size = "1280x720", walkthrough, reference, out, ceiling;
@@ -47,14 +86,7 @@ std::vector<double> draw_times(const Arguments& a, double seconds) {
 Result<SessionPlan> make_plan(const Arguments& a) {
   SessionPlan plan;
   if (auto ok = parse_address(a.server, plan.host, plan.port); !ok) return std::unexpected(ok.error());
-  unsigned width = 0, height = 0;
-  char rest = 0;
-  if (std::sscanf(a.size.c_str(), "%ux%u%c", &width, &height, &rest) != 2 || width < 1 || height < 1 || width > 8192 ||
-      height > 8192) {
-    return fail("--size " + a.size + ": expected WIDTHxHEIGHT, 1 to 8192 each");
-  }
-  plan.width = width;
-  plan.height = height;
+  if (auto ok = parse_size(a.size, plan.width, plan.height); !ok) return std::unexpected(ok.error());
   plan.updates_per_second = a.updates_per_second;
   plan.seconds = a.seconds;
   if (a.until_error >= 0) {
@@ -172,26 +204,31 @@ void declare(CLI::App& app, Arguments& a) {
                  "JSON list of {t, position, target, fovy}; begins at the first full image");
   app.add_option("--size", a.size, "picture, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--seconds", a.seconds,
-                 "stop after so long (default 10, a walkthrough's length; the limit of --until-error: 120)");
+                 "stop after so long (default 10, a walkthrough's length; the limit of --until-error: 120)")
+      ->check(number(0, kLongest));
   app.add_option("--until-error", a.until_error,
-                 "stop once the server's estimated RMS display error is at most this, 0..1");
+                 "stop once the server's estimated RMS display error is at most this, 0..1")
+      ->check(number(0, 1));
   app.add_option("--reference", a.reference, "BASE.pfm with its halves BASE.a.pfm and BASE.b.pfm beside it");
   app.add_option("--ceiling-seconds", a.ceiling_seconds,
-                 "then open a lossless session at the same camera for so long and score it as the ceiling");
+                 "then open a lossless session at the same camera for so long and score it as the ceiling")
+      ->check(number(0, kLongest));
   app.add_option("--ceiling-phystex", a.ceiling_phystex, "PhysTex of that session, pixels")->capture_default_str();
-  app.add_option("--ceiling", a.ceiling, "picture of the ceiling: read if it is there, else written");
+  app.add_option("--ceiling", a.ceiling, "picture of the ceiling: read if it is there, else written")
+      ->check(kWritablePlace);
   app.add_flag("--lossless", a.lossless, "stream without codec (the server must allow it)");
   app.add_flag("--no-444", a.no_444, "do not offer 4:4:4 chroma");
   app.add_option("--phystex", a.phystex, "largest PhysTex to accept, pixels")->capture_default_str();
   app.add_option("--updates-per-second", a.updates_per_second, "cameras sent, also when still")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 240.0));
+      ->check(number(0.1, 240));
   app.add_option("--series-interval", a.series_interval,
-                 "seconds between points of the series (default: 1, 2, 5, 10, 20, 30, 60, ...)");
+                 "seconds between points of the series (default: 1, 2, 5, 10, 20, 30, 60, ...)")
+      ->check(number(0, kLongest));
   app.add_flag("--codec-check", a.codec_check,
                "then compare each tile with a lossless session's: PSNR of PhysTex after the codec (a lower bound)");
   app.add_option("--bench-draw", a.bench_draw, "draw so many pictures at the end to measure frames/s");
-  app.add_option("--out", a.out, "PNG of the last picture");
+  app.add_option("--out", a.out, "PNG of the last picture")->check(kWritablePlace);
   app.add_flag("--json", a.json, "report as JSON on standard output");
 }
 

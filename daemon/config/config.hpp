@@ -85,9 +85,8 @@ struct SessionConfig {
   std::uint32_t max_sessions = 64;
   double handshake_timeout_s = 10;
   double idle_timeout_s = 30;
-  std::uint64_t send_queue_bytes = 64u << 20;   ///< a slower client is cut off
-  double send_queue_seconds = 10;               ///< age of the oldest unsent byte at which it is cut off
-  std::uint32_t max_message_bytes = 64u << 10;  ///< of one message from a client
+  std::uint64_t send_queue_bytes = 64u << 20;  ///< a slower client is cut off
+  double send_queue_seconds = 10;              ///< age of the oldest unsent byte at which it is cut off
 };
 
 /// [listen]. Port 0: any free one.
@@ -95,7 +94,7 @@ struct ListenConfig {
   std::string address = "0.0.0.0";
   int tcp_port = 9010;
   int udp_port = 9010;
-  int http_port = 0;        ///< reserved for the web client; 0: off
+  int http_port = 0;        ///< reserved for the web client: only 0 (off)
   int metrics_port = 9090;  ///< Prometheus; -1: off
 };
 

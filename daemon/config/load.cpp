@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -120,7 +119,6 @@ void read_service(TableReader& root, Config& config) {
     reader.number("idle_timeout_s", config.session.idle_timeout_s, 1, 86400);
     reader.integer("send_queue_bytes", config.session.send_queue_bytes, 1 << 20, kMaxBytes);
     reader.number("send_queue_seconds", config.session.send_queue_seconds, 0.5, 3600);
-    reader.integer("max_message_bytes", config.session.max_message_bytes, 1024, 64 << 20);
   });
   root.table("listen", [&](TableReader& reader) {
     reader.text("address", config.listen.address, 255);
@@ -162,6 +160,7 @@ void apply(std::string_view toml, const std::filesystem::path& file, Config& con
 std::expected<std::string, std::string> read_file(const std::filesystem::path& file) {
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
+  if (std::filesystem::is_directory(status)) return std::unexpected("is a directory; name the TOML file in it");
   if (error || !std::filesystem::is_regular_file(status)) return std::unexpected("cannot be read: no such file");
   const auto size = std::filesystem::file_size(file, error);
   if (error) return std::unexpected("cannot be read: " + error.message());
@@ -208,14 +207,13 @@ std::string to_string(std::span<const Fault> faults) {
 std::vector<Fault> check(const Config& config) {
   std::vector<Fault> faults;
   check_names(config.cameras, "cameras", faults);
-  const std::array<std::pair<const char*, int>, 3> ports = {{{"listen.tcp_port", config.listen.tcp_port},
-                                                             {"listen.http_port", config.listen.http_port},
-                                                             {"listen.metrics_port", config.listen.metrics_port}}};
-  for (std::size_t i = 0; i < ports.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      if (ports[i].second > 0 && ports[i].second == ports[j].second)
-        faults.push_back(
-            {kSum, 0, ports[i].first, fmt::format("{} is {} too; ports must differ", ports[i].second, ports[j].first)});
+  if (config.listen.http_port != 0)
+    faults.push_back({kSum, 0, "listen.http_port",
+                      fmt::format("{}: there is no web client yet, and nothing would listen; leave it 0 (off)",
+                                  config.listen.http_port)});
+  if (config.listen.tcp_port > 0 && config.listen.tcp_port == config.listen.metrics_port)
+    faults.push_back({kSum, 0, "listen.metrics_port",
+                      fmt::format("{} is listen.tcp_port too; ports must differ", config.listen.metrics_port)});
   if (config.listen.address.empty())
     faults.push_back({kSum, 0, "listen.address", "must not be empty; 0.0.0.0 is every address of this machine"});
   if (config.state.dir.empty()) faults.push_back({kSum, 0, "state.dir", "must not be empty"});

@@ -1,6 +1,8 @@
 #include "daemon/observe/prometheus_sink.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <netinet/in.h>
 #include <prometheus/counter.h>
 #include <prometheus/exposer.h>
 #include <prometheus/gauge.h>
@@ -11,12 +13,14 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <map>
 #include <mutex>
 #include <shared_mutex>
 #include <unordered_map>
 #include <variant>
+#include <vector>
 
 namespace darm::observe {
 namespace {
@@ -50,10 +54,41 @@ struct TextHash {
   std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
 };
 
-// civetweb's listening_ports: an IPv6 address is written in brackets.
-std::string bind_address(const std::string& address, std::uint16_t port) {
+// A scrape takes one request and milliseconds. Who connects and says nothing holds a thread until the timeout, so there
+// are some to spare, and none is kept for a second request.
+constexpr const char* kThreads = "8";
+constexpr const char* kRequestTimeoutMs = "2000";
+
+// An IPv6 address is written in brackets, in URLs as in civetweb's listening_ports.
+std::string host_and_port(const std::string& address, std::uint16_t port) {
   return address.find(':') == std::string::npos ? fmt::format("{}:{}", address, port)
                                                 : fmt::format("[{}]:{}", address, port);
+}
+
+// What reaches as far in IPv4: civetweb may have been built without IPv6 (Debian's is). Empty: nothing does.
+std::string in_ipv4(const std::string& address) {
+  in6_addr parsed{};
+  if (inet_pton(AF_INET6, address.c_str(), &parsed) != 1) return {};
+  if (std::memcmp(&parsed, &in6addr_any, sizeof parsed) == 0) return "0.0.0.0";
+  return std::memcmp(&parsed, &in6addr_loopback, sizeof parsed) == 0 ? "127.0.0.1" : "";
+}
+
+Result<std::unique_ptr<prometheus::Exposer>> make_exposer(const std::string& address, std::uint16_t port) {
+  const std::string where = host_and_port(address, port);
+  const char* advice = address.find(':') == std::string::npos
+                           ? "is the port taken? set listen.metrics_port (-1: off)"
+                           : "the HTTP server may have been built without IPv6: set listen.address to \"::\", or "
+                             "listen.metrics_port to -1 (off)";
+  try {
+    auto exposer = std::make_unique<prometheus::Exposer>(
+        std::vector<std::string>{"listening_ports", where, "num_threads", kThreads, "request_timeout_ms",
+                                 kRequestTimeoutMs, "enable_keep_alive", "no"});
+    const auto ports = exposer->GetListeningPorts();
+    if (!ports.empty() && ports.front() > 0) return exposer;
+    return fail(fmt::format("{}: metrics cannot be served there; {}", where, advice));
+  } catch (const std::exception& e) {
+    return fail(fmt::format("{}: metrics cannot be served there; {} ({})", where, advice, e.what()));
+  }
 }
 
 }  // namespace
@@ -93,6 +128,7 @@ class PrometheusSink::Impl {
 
   std::unique_ptr<prometheus::Exposer> exposer;
   std::uint16_t port = 0;
+  std::string url;
 
  private:
   template <class M>
@@ -122,19 +158,21 @@ PrometheusSink::PrometheusSink() : impl_(std::make_unique<Impl>()) {}
 PrometheusSink::~PrometheusSink() = default;
 
 Result<void> PrometheusSink::expose(const std::string& address, std::uint16_t port) {
-  const std::string where = bind_address(address, port);
-  try {
-    auto exposer = std::make_unique<prometheus::Exposer>(where, 2);
-    exposer->RegisterCollectable(impl_->shared_registry());
-    const auto ports = exposer->GetListeningPorts();
-    if (ports.empty() || ports.front() <= 0) return fail(where + ": metrics cannot be served there");
-    impl_->port = static_cast<std::uint16_t>(ports.front());
-    impl_->exposer = std::move(exposer);
-    return {};
-  } catch (const std::exception&) {
-    return fail(where + ": metrics cannot be served there; is the port taken? set listen.metrics_port (-1: off)");
+  std::string bound = address;
+  auto exposer = make_exposer(bound, port);
+  if (const auto ipv4 = in_ipv4(address); !exposer && !ipv4.empty()) {
+    bound = ipv4;
+    exposer = make_exposer(bound, port);
   }
+  if (!exposer) return std::unexpected(exposer.error());
+  (*exposer)->RegisterCollectable(impl_->shared_registry());
+  impl_->port = static_cast<std::uint16_t>((*exposer)->GetListeningPorts().front());
+  impl_->url = fmt::format("http://{}/metrics", host_and_port(bound, impl_->port));
+  impl_->exposer = std::move(*exposer);
+  return {};
 }
+
+std::string PrometheusSink::url() const { return impl_->url; }
 
 std::uint16_t PrometheusSink::port() const { return impl_->port; }
 

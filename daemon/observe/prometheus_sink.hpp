@@ -21,11 +21,14 @@ class PrometheusSink final : public runtime::MetricSink {
   PrometheusSink();
   ~PrometheusSink() override;
 
-  /// Serves http://address:port/metrics on two threads of its own. Port 0: any free one, told by port(). Error: the
-  /// address cannot be bound.
+  /// Serves http://address:port/metrics on threads of its own, until the end: that takes up to two seconds while
+  /// somebody is connected. Port 0: any free one, told by port(). Where IPv6 cannot be served, :: and ::1 are taken for
+  /// 0.0.0.0 and 127.0.0.1; url() says what came of it. Error: the address cannot be bound.
   [[nodiscard]] Result<void> expose(const std::string& address, std::uint16_t port);
   /// The port that is served; 0 before expose().
   [[nodiscard]] std::uint16_t port() const;
+  /// Where the metrics are, with the address that was bound; empty before expose().
+  [[nodiscard]] std::string url() const;
   /// All series in Prometheus' text format.
   [[nodiscard]] std::string text() const;
 

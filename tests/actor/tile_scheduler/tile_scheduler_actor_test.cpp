@@ -17,6 +17,7 @@ using namespace std::chrono_literals;
 struct Heard {
   std::vector<renderer::ShadeTiles> work;
   std::map<StreamId, std::vector<encoder::ComposeFrame>> frames;
+  std::vector<StreamId> order;  // of all frames
   std::vector<session::NoChange> no_changes;
   std::map<StreamId, std::vector<SessionId>> receivers;
   std::set<StreamId> encoders;
@@ -36,7 +37,10 @@ class FakeEncoder : public runtime::Actor<encoder::Inbox> {
  public:
   FakeEncoder(runtime::Context<encoder::Inbox> context, Heard* heard, StreamId stream)
       : Actor(std::move(context)), heard_(heard), stream_(stream) {}
-  void on(encoder::ComposeFrame&& m) { heard_->frames[stream_].push_back(std::move(m)); }
+  void on(encoder::ComposeFrame&& m) {
+    heard_->order.push_back(stream_);
+    heard_->frames[stream_].push_back(std::move(m));
+  }
   void on(encoder::PictureEncoded&&) {}
 
  private:
@@ -282,6 +286,29 @@ TEST_F(TileScheduler, AKeyFrameHoldsTheWholeTable) {
   EXPECT_EQ(key.writes.size(), key.edits.size());
 }
 
+TEST_F(TileScheduler, AClientMayForceTwoKeyFramesASecond) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  finish_frame(first_);
+  tick();
+  const auto keys_in = [&](int requests) {
+    std::size_t keys = 0;
+    for (int i = 0; i < requests; ++i) {
+      const auto before = heard_.frames[first_].size();
+      scheduler_.tell(KeyFrameWanted(ann_));
+      system_.advance(10ms);
+      if (heard_.frames[first_].size() == before) continue;
+      keys += heard_.frames[first_].back().key ? 1 : 0;
+      finish_frame(first_);
+    }
+    return keys;
+  };
+  EXPECT_EQ(keys_in(30), 1u) << "0.3 s";
+  const auto keys = keys_in(300);
+  EXPECT_GE(keys, 5u) << "3 s: put off, not refused";
+  EXPECT_LE(keys, 7u);
+}
+
 TEST_F(TileScheduler, JoinsTheWorkOfAllSessionsAndForgetsAClosedOne) {
   const SessionId bob{2};
   open(ann_);
@@ -309,6 +336,27 @@ TEST_F(TileScheduler, ASessionThatClosesWhileItsViewIsTracedLeavesNothingBehind)
   EXPECT_TRUE(heard_.work.back().work->empty());
   look(ann_, 2, ahead_);
   EXPECT_TRUE(heard_.frames[first_].empty());
+}
+
+TEST_F(TileScheduler, ASmallViewNeedNotWaitForTheLargestThereIs) {
+  const SessionId bob{2};
+  open(ann_);
+  open(bob);
+  scheduler_.tell(ViewChanged(ann_, 1, ahead_, Viewport{16384, 16384}, FrameStamps{}));
+  scheduler_.tell(ViewChanged(bob, 1, aside_, Viewport{160, 90}, FrameStamps{}));
+  system_.run_until_idle();
+  EXPECT_EQ(heard_.order, (std::vector<StreamId>{StreamId{2}, first_})) << "slices take turns";
+}
+
+TEST_F(TileScheduler, WhatAClosedSessionWouldHaveSeenIsTracedNoFurther) {
+  open(ann_);
+  const Viewport largest{16384, 16384};
+  scheduler_.tell(ViewChanged(ann_, 1, ahead_, largest, FrameStamps{}));
+  const auto all = system_.run_until_idle();
+  system_.advance(1s);
+  scheduler_.tell(ViewChanged(ann_, 2, aside_, largest, FrameStamps{}));
+  scheduler_.tell(SessionClosed(ann_));
+  EXPECT_LT(system_.run_until_idle(), all / 4);
 }
 
 TEST_F(TileScheduler, AFailedFrameIsFollowedByAKeyFrame) {

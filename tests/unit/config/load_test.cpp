@@ -68,7 +68,6 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.session.idle_timeout_s, b.session.idle_timeout_s);
   EXPECT_EQ(a.session.send_queue_bytes, b.session.send_queue_bytes);
   EXPECT_EQ(a.session.send_queue_seconds, b.session.send_queue_seconds);
-  EXPECT_EQ(a.session.max_message_bytes, b.session.max_message_bytes);
   EXPECT_EQ(a.listen.address, b.listen.address);
   EXPECT_EQ(a.listen.tcp_port, b.listen.tcp_port);
   EXPECT_EQ(a.listen.udp_port, b.listen.udp_port);
@@ -214,8 +213,20 @@ TEST(LoadConfig, MissingAndOversizedFilesAreFaults) {
   const std::vector<std::filesystem::path> files{"/nowhere/x.toml", big, std::filesystem::temp_directory_path()};
   const auto loaded = load(files);
   ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().size(), 3u);
+  ASSERT_EQ(loaded.error().size(), 3u);
+  EXPECT_TRUE(loaded.error()[2].text.starts_with("is a directory")) << loaded.error()[2].text;
   std::filesystem::remove(big);
+}
+
+TEST(CheckConfig, WhatNothingListensOnIsRefused) {
+  const auto faults = faults_of("[listen]\nhttp_port = 8080\n");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_TRUE(faults[0].find("listen.http_port: 8080: there is no web client yet") != std::string::npos) << faults[0];
+}
+
+TEST(CheckConfig, KeysThatChangeNothingAreUnknown) {
+  EXPECT_EQ(faults_of("[session]\nmax_message_bytes = 65536\n").size(), 1u)
+      << "the protocol fixes it: proto/limits.hpp";
 }
 
 TEST(CheckConfig, PortsAndNamesMustDiffer) {

@@ -4,8 +4,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "daemon/observe/log.hpp"
 #include "daemon/observe/prometheus_sink.hpp"
@@ -13,15 +16,25 @@
 namespace darm::observe {
 namespace {
 
-// The answer to GET /metrics on a local port.
-std::string fetch(std::uint16_t port) {
+// A connection to a local port, waiting at most 6 s for what it reads; -1: none.
+int connect_to(std::uint16_t port) {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const timeval patience{.tv_sec = 6, .tv_usec = 0};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
+  close(fd);
+  return -1;
+}
+
+// The answer to GET /metrics on a local port.
+std::string fetch(std::uint16_t port) {
+  const int fd = connect_to(port);
   std::string answer;
-  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+  if (fd >= 0) {
     const std::string request = "GET /metrics HTTP/1.0\r\nHost: localhost\r\nConnection: close\r\n\r\n";
     (void)!send(fd, request.data(), request.size(), MSG_NOSIGNAL);
     char buffer[4096];
@@ -86,6 +99,34 @@ TEST(PrometheusSinkTest, ServesOverHttpOnAnyFreePort) {
   EXPECT_TRUE(has(answer, "200 OK")) << answer;
   EXPECT_TRUE(has(answer, "darm_ready 1")) << answer;
   EXPECT_TRUE(has(answer, "darm_build_info{version=\"1.2.3\"} 1")) << answer;
+}
+
+TEST(PrometheusSinkTest, AnyAndLoopbackOfIpv6AreServedOneWayOrTheOther) {
+  for (const char* address : {"::", "::1"}) {
+    PrometheusSink sink;
+    const auto exposed = sink.expose(address, 0);
+    ASSERT_TRUE(exposed) << exposed.error().message;
+    EXPECT_TRUE(has(sink.url(), std::to_string(sink.port()).append("/metrics"))) << sink.url();
+    if (has(sink.url(), "[")) continue;  // a build with IPv6
+    EXPECT_TRUE(has(fetch(sink.port()), "200 OK")) << sink.url();
+  }
+  const auto elsewhere = PrometheusSink().expose("2001:db8::1", 0);
+  ASSERT_FALSE(elsewhere);
+  EXPECT_TRUE(has(elsewhere.error().message, "[2001:db8::1]:0")) << elsewhere.error().message;
+  EXPECT_TRUE(has(elsewhere.error().message, "built without IPv6")) << elsewhere.error().message;
+  EXPECT_TRUE(has(elsewhere.error().message, "CivetServer")) << "the reason as it was given";
+}
+
+TEST(PrometheusSinkTest, WhoConnectsAndSaysNothingKeepsNobodyOut) {
+  auto sink = std::make_unique<PrometheusSink>();
+  ASSERT_TRUE(sink->expose("127.0.0.1", 0));
+  std::vector<int> idle;
+  for (int i = 0; i < 12; ++i) idle.push_back(connect_to(sink->port()));
+  EXPECT_TRUE(has(fetch(sink->port()), "200 OK"));
+  const auto start = std::chrono::steady_clock::now();
+  sink.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(4));
+  for (const int fd : idle) close(fd);
 }
 
 TEST(PrometheusSinkTest, TakenPortIsAnErrorThatNamesIt) {

@@ -72,23 +72,58 @@ TEST_F(Reference, a_resumed_picture_equals_an_uninterrupted_one) {
   EXPECT_EQ(whole.own_psnr, resumed.own_psnr);
 }
 
-TEST_F(Reference, a_foreign_or_damaged_state_is_refused) {
+TEST_F(Reference, a_foreign_or_damaged_state_is_warned_of_and_begun_anew) {
+  const auto whole = render_reference(*transport_, job_).value();
   job_.state_file = folder_ / "state";
-  ASSERT_TRUE(render_reference(*transport_, job_).has_value());
+  std::vector<std::string> warnings;
+  job_.warn = [&warnings](const std::string& what) { warnings.push_back(what); };
   auto other = job_;
   other.exposure = 2;
-  EXPECT_FALSE(render_reference(*transport_, other).has_value());
+  EXPECT_NE(reference_hash(*transport_, job_), reference_hash(*transport_, other));
+  ASSERT_TRUE(render_reference(*transport_, other).has_value());
+  EXPECT_TRUE(warnings.empty());
+  // Each time the picture is that of a run without a state file, and its state takes the place of the broken one.
+  const auto begins_anew = [&](const char* how) {
+    const auto made = render_reference(*transport_, job_);
+    ASSERT_TRUE(made.has_value()) << how;
+    EXPECT_TRUE(same(whole.mean, made->mean)) << how;
+    EXPECT_EQ(warnings.size(), 1u) << how;
+    warnings.clear();
+    job_.progress = [&](const ReferenceProgress&) { return ADD_FAILURE() << how << ": all was done", false; };
+    EXPECT_TRUE(render_reference(*transport_, job_).has_value());
+    EXPECT_TRUE(warnings.empty()) << how;
+    job_.progress = nullptr;
+  };
+  begins_anew("of another picture");
   const auto size = std::filesystem::file_size(job_.state_file);
   {
     std::fstream file(job_.state_file, std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(static_cast<std::streamoff>(size / 2));
     file.put('\x5a');
   }
-  EXPECT_FALSE(render_reference(*transport_, job_).has_value());
+  begins_anew("damaged");
   std::filesystem::resize_file(job_.state_file, size - 3);
-  EXPECT_FALSE(render_reference(*transport_, job_).has_value());
+  begins_anew("cut short");
   std::ofstream(job_.state_file, std::ios::trunc) << "nonsense";
-  EXPECT_FALSE(render_reference(*transport_, job_).has_value());
+  begins_anew("of no kind");
+}
+
+TEST_F(Reference, a_state_that_cannot_be_written_is_warned_of_once_and_costs_no_picture) {
+  const auto whole = render_reference(*transport_, job_).value();
+  int warnings = 0;
+  job_.warn = [&warnings](const std::string&) { ++warnings; };
+  job_.save_seconds = 0;
+  job_.state_file = folder_ / "missing" / "state";
+  auto made = render_reference(*transport_, job_);
+  ASSERT_TRUE(made.has_value());
+  EXPECT_TRUE(same(whole.mean, made->mean));
+  EXPECT_EQ(warnings, 1);
+  job_.state_file = folder_ / "state";  // a folder: what was written beside it cannot take its name
+  std::filesystem::create_directories(job_.state_file / "full");
+  made = render_reference(*transport_, job_);
+  ASSERT_TRUE(made.has_value());
+  EXPECT_TRUE(same(whole.mean, made->mean));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "state.part"));
 }
 
 TEST_F(Reference, own_psnr_predicts_the_error_against_a_better_picture) {

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "actors/tile_scheduler/texel_taps.hpp"
+#include "actors/tile_scheduler/view_job.hpp"
 #include "actors/tile_scheduler/working_set.hpp"
 #include "tests/unit/tile_scheduler/quad_scene.hpp"
 
@@ -130,6 +131,57 @@ VisibleSet trace_passes(const testing::TestWorld& world, const Camera& camera, i
   return set.current();
 }
 
+TEST(Visibility, APassOfTheLargestViewportCostsWhatOneOf1080pDoes) {
+  const auto world = make_room();
+  const auto camera = look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55);
+  for (const Viewport viewport : {Viewport{16384, 16384}, Viewport{3840, 2160}, Viewport{1920, 1080}}) {
+    const ViewSampler sampler(*world.layout, *world.rays, camera, viewport);
+    VisibleSet set;
+    trace_rows(sampler, 0, 0, block_rows(viewport), set);
+    EXPECT_LT(set.samples(), 1.02 * kMaxRays) << viewport.width;
+    EXPECT_GT(set.samples(), 0.95 * kMaxRays) << viewport.width;
+    for (const auto& chain : set.chains()) EXPECT_LE(chain.tiles[0].level(), 1) << "the level is the real viewport's";
+  }
+}
+
+TEST(Visibility, SmallerPicturesAreTracedInBlocksOfFour) {
+  EXPECT_EQ(block_side({1920, 1080}), 4.0f);
+  EXPECT_EQ(passes_per_picture({1920, 1080}), kPassesPerPicture);
+  EXPECT_EQ(block_rows({1, 1}), 1u);
+  EXPECT_EQ(block_columns({161, 90}), 41u);
+  // 4K: within kAllPasses every pixel is looked at.
+  EXPECT_LE(passes_per_picture({3840, 2160}), kAllPasses);
+}
+
+TEST(ViewJob, RunsInShortStepsAndEndsWhenCancelled) {
+  const auto world = make_room();
+  const Viewport viewport{16384, 16384};
+  ViewJob job(1, world.layout, world.rays, look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55), viewport, 0, 2, 2);
+  ASSERT_EQ(job.slice_count(), 2u);
+  EXPECT_EQ(job.run_step(0), ViewJob::Step::kMore);
+  EXPECT_LE(job.results()[0].samples(), kRaysPerStep);
+  EXPECT_GT(job.results()[0].samples(), 0);
+  job.cancel();
+  EXPECT_EQ(job.run_step(0), ViewJob::Step::kSliceDone);
+  EXPECT_EQ(job.run_step(1), ViewJob::Step::kAllDone);
+  EXPECT_LE(job.results()[0].samples(), kRaysPerStep);
+}
+
+TEST(ViewJob, StepsMakeWhatWholePassesMake) {
+  const auto world = make_room();
+  const auto camera = look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55);
+  const Viewport viewport{1280, 720};
+  ViewJob job(1, world.layout, world.rays, camera, viewport, 0, 2, 3);
+  VisibleSet joined, whole;
+  for (unsigned slice = 0; slice < job.slice_count(); ++slice) EXPECT_EQ(job.run_slice(slice), slice == 2);
+  for (const auto& part : job.results()) joined.merge(part);
+  const ViewSampler sampler(*world.layout, *world.rays, camera, viewport);
+  for (int pass = 0; pass < 2; ++pass) trace_rows(sampler, pass, 0, block_rows(viewport), whole);
+  EXPECT_EQ(joined.samples(), whole.samples());
+  EXPECT_EQ(joined.tiles().size(), whole.tiles().size());
+  EXPECT_EQ(joined.chains().size(), whole.chains().size());
+}
+
 TEST(Visibility, SixtyFourPassesHoldEveryTexelTheClientReads) {
   const auto world = make_room();
   const auto camera = look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55);
@@ -233,7 +285,7 @@ TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
   options.previous_weight = 0.25f;
   WorkingSet set(options);
   set.add(a, 1);
-  set.start_pose(1000);
+  set.start_pose(1000, kPassesPerPicture);
   set.add(b, 1);
   const auto total = [&] {
     double sum = 0;

@@ -1,0 +1,111 @@
+"""Clients that keep to the protocol's letter and ask for all they can: the others go on, and the daemon stops in time."""
+import math
+import signal
+import socket
+import struct
+import threading
+import time
+import unittest
+from pathlib import Path
+
+from running import Daemon, Folder, probe, wait_until
+
+HELLO, CAMERA = 1, 2
+
+
+def varint(n):
+    out = b""
+    while n > 0x7F:
+        out += bytes([n & 0x7F | 0x80])
+        n >>= 7
+    return out + bytes([n])
+
+
+def field(number, value):
+    """A protobuf field: int -> varint, float -> 32 bits, bytes -> length-delimited."""
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    if isinstance(value, float):
+        return varint(number << 3 | 5) + struct.pack("<f", value)
+    return varint(number << 3 | 2) + varint(len(value)) + value
+
+
+def pose(angle, width, height):
+    position = b"".join(varint(n << 3 | 1) + struct.pack("<d", x) for n, x in ((1, 0.0), (2, 1.7), (3, 0.0)))
+    return (field(1, position) + field(2, math.cos(angle / 2)) + field(4, math.sin(angle / 2)) + field(6, 1.0) +
+            field(7, width) + field(8, height))
+
+
+class Client:
+    """Reads and forgets what it is sent."""
+
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port))
+        threading.Thread(target=self.drain, daemon=True).start()
+        self.send(HELLO, field(1, 1) + field(2, b"rude") + field(4, 2048))
+
+    def drain(self):
+        try:
+            while self.socket.recv(1 << 16):
+                pass
+        except OSError:
+            pass
+
+    def send(self, kind, body):
+        envelope = field(kind, body)
+        self.socket.sendall(struct.pack(">I", len(envelope)) + envelope)
+
+    def look(self, sequence, width, height):
+        self.send(CAMERA, field(1, sequence) + field(3, pose(0.7 * sequence, width, height)))
+
+
+class RudeClients(unittest.TestCase):
+    def test_the_largest_viewport_in_motion_holds_up_neither_others_nor_the_stop(self):
+        with Folder() as folder:
+            daemon = Daemon(Path(folder) / "state")
+            rude = [Client(daemon.tcp) for _ in range(2)]
+            done = threading.Event()
+
+            def move():
+                sequence = 0
+                while not done.wait(0.3):
+                    sequence += 1
+                    for client in rude:
+                        try:
+                            client.look(sequence, 16384, 16384)
+                        except OSError:
+                            return  # the daemon is gone
+
+            mover = threading.Thread(target=move)
+            mover.start()
+            time.sleep(1)
+            try:
+                report = probe(daemon.tcp, Path(folder) / "picture.png", "--seconds", "4")
+            finally:
+                start = time.monotonic()
+                code = daemon.stop()
+                stopped = time.monotonic() - start
+                done.set()
+                mover.join()
+            self.assertEqual(code, 0)
+            self.assertLess(report["seconds_to_first_image"], 3)
+            self.assertLess(stopped, 3)
+
+    def test_who_connects_to_the_metrics_and_says_nothing_does_not_hold_up_the_stop(self):
+        with Folder() as folder:
+            daemon = Daemon(Path(folder) / "state")
+            self.addCleanup(daemon.process.kill)
+            idle = [socket.create_connection(("127.0.0.1", daemon.metrics)) for _ in range(10)]
+            time.sleep(0.2)
+            start = time.monotonic()
+            daemon.process.send_signal(signal.SIGTERM)
+            wait_until(lambda: "stopped" in daemon.messages(), 10, "stopped")
+            daemon.process.wait(timeout=0.5)  # what has said so is gone
+            self.assertEqual(daemon.stop(), 0)
+            self.assertLess(time.monotonic() - start, 5)
+            for one in idle:
+                one.close()
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
