@@ -9,8 +9,9 @@ namespace darm::renderer {
 inline constexpr float kOutlierSamples = 256;
 
 /// How many times the mean of its neighbours (5x5, same patch, itself left out) a texel of `count` samples may shine:
-/// 2 + count / 8. Grows with the samples, so that in the limit nothing is held down; what is held down meanwhile
-/// darkens the picture, never the store.
+/// 2 + 24 / count + count / 8. One sample may be many times the mean and still be what light is like there (a window
+/// that one direction in twenty meets): held to twice its neighbours it costs Sponza's atrium 4 dB. In the limit
+/// nothing is held down; what is held down meanwhile darkens the picture, never the store.
 [[nodiscard]] float outlier_bound(float count);
 
 /// Scales texels brighter than their bound down to it, irradiance, grey and spread alike.
