@@ -167,6 +167,7 @@ void Daemon::Parts::spawn_actors() {
   parts.surfaces = renderer::make_scene_surfaces(world.scene, world.mapper, world.transport, seed);
   parts.store = world.store;
   parts.levels = renderer::level_tiles_of(*world.layout);
+  parts.layout = world.layout;
   parts.options = renderer_options(config, world.exposure);
   parts.scheduler = scheduler;
   parts.metrics = &metrics;

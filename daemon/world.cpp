@@ -42,7 +42,7 @@ Result<void> make_state_dir(const std::filesystem::path& dir) {
 }
 
 /// What the stored light depends on beside scene and layout: the sample sequences and what a sample means.
-constexpr std::uint64_t kLightVersion = 1;
+constexpr std::uint64_t kLightVersion = 2;
 
 }  // namespace
 

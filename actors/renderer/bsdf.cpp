@@ -45,6 +45,7 @@ Bsdf::Bsdf(const trace::Surface& surface, const MaterialPoint& material, const g
   const float let_through = (1.0f - material.metallic) * std::max(1.0f - f, std::min(material.ggx_alpha, 0.5f));
   const float transmit = lobe ? let_through * material.transmission * base : 0.0f;
   const float sum = specular + diffuse + transmit;
+  scattered_ = sum;
   if (!(sum > 1e-8f)) return;
   specular_probability_ = specular / sum;
   diffuse_probability_ = diffuse / sum;
@@ -74,6 +75,27 @@ glm::vec3 Bsdf::reflectance(float cosine) const {
   return glm::vec3((1.0f - material_.metallic) * fresnel(cosine)) + metal * material_.metallic;
 }
 
+// 1 - F(n.v), not F(v.h) as in appendix B: with v.h a smooth plastic returns up to 1.4 times the light at grazing
+// angles. The view average is then exactly MaterialPoint::diffuse_albedo.
+glm::vec3 Bsdf::diffuse_share() const {
+  return material_.base * ((1.0f - material_.metallic) * (1.0f - material_.transmission) * (1.0f - fresnel(wo_.z)));
+}
+
+glm::vec3 Bsdf::take_diffuse() {
+  if (!(diffuse_probability_ > 0)) return glm::vec3(0.0f);
+  const glm::vec3 share = diffuse_share();
+  const float rest = 1.0f - diffuse_probability_;
+  scattered_ *= rest;
+  diffuse_probability_ = 0;
+  if (rest > 1e-6f) {
+    specular_probability_ /= rest;
+    transmit_probability_ /= rest;
+  } else {
+    scattered_ = specular_probability_ = transmit_probability_ = 0;
+  }
+  return share;
+}
+
 glm::vec3 Bsdf::evaluate_reflection(const glm::vec3& wi, const glm::vec3& li, float& pdf) const {
   glm::vec3 f(0.0f);
   const float cos_diffuse = glm::dot(normal_, wi);
@@ -81,10 +103,7 @@ glm::vec3 Bsdf::evaluate_reflection(const glm::vec3& wi, const glm::vec3& li, fl
   const glm::vec3 h = glm::normalize(wo_ + li);
   const float cos_half = glm::clamp(glm::dot(wo_, h), 0.0f, 1.0f);
   if (diffuse_probability_ > 0 && cos_diffuse > 0) {
-    // 1 - F(n.v), not F(v.h) as in appendix B: with v.h a smooth plastic returns up to 1.4 times the light at grazing
-    // angles. The view average is then exactly MaterialPoint::diffuse_albedo.
-    const float share = (1.0f - material_.metallic) * (1.0f - material_.transmission) * (1.0f - fresnel(wo_.z));
-    f += material_.base * (share * cos_diffuse * kInversePi);
+    f += diffuse_share() * (cos_diffuse * kInversePi);
     pdf += diffuse_probability_ * cos_diffuse * kInversePi;
   }
   if (specular && specular_probability_ > 0) {

@@ -28,6 +28,10 @@ class Bsdf {
   /// f(wo, wi) |cos wi| and the density with which sample() gives wi.
   [[nodiscard]] glm::vec3 evaluate(const glm::vec3& wi, float& pdf) const;
   [[nodiscard]] BsdfSample sample(Sampler& sampler) const;
+  /// Takes the diffuse lobe out, for those who know its light already: pi * f of that lobe towards wo.
+  [[nodiscard]] glm::vec3 take_diffuse();
+  /// Estimated share of light that the lobes (still in) scatter, a luminance >= 0.
+  [[nodiscard]] float scattered() const { return scattered_; }
   /// False: light reaches only from the front of the geometric normal.
   [[nodiscard]] bool transmits() const { return transmit_probability_ > 0; }
   [[nodiscard]] const glm::vec3& normal() const { return normal_; }
@@ -37,6 +41,7 @@ class Bsdf {
   [[nodiscard]] glm::vec3 to_local(const glm::vec3& w) const;
   [[nodiscard]] glm::vec3 to_world(const glm::vec3& w) const;
   [[nodiscard]] float fresnel(float cosine) const;
+  [[nodiscard]] glm::vec3 diffuse_share() const;
   [[nodiscard]] glm::vec3 reflectance(float cosine) const;
   [[nodiscard]] glm::vec3 evaluate_reflection(const glm::vec3& wi, const glm::vec3& li, float& pdf) const;
   [[nodiscard]] glm::vec3 evaluate_thin(const glm::vec3& li, float& pdf) const;
@@ -49,6 +54,7 @@ class Bsdf {
   glm::vec3 axis_[3];  // frame of the specular lobes
   glm::vec3 wo_;       // in that frame, z > 0
   float eta_ = 1;      // index on wo's side over index beyond, for volumes
+  float scattered_ = 0;
   float diffuse_probability_ = 0;
   float specular_probability_ = 0;
   float transmit_probability_ = 0;

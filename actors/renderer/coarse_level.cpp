@@ -7,38 +7,59 @@
 
 namespace darm::renderer {
 
-namespace {
-
-TexelMask every_fourth() {
-  TexelMask mask;
-  for (int y = 0; y < kTileSize; y += 2)
-    for (int x = 0; x < kTileSize; x += 2) mask.set(x, y);
-  return mask;
+void CoarseRounds::prefer(std::span<const CoarseRequest> seen) {
+  if (!opening()) return;
+  preferred_.assign(seen.begin(), seen.end());
+  std::erase_if(preferred_, [&](const CoarseRequest& r) { return r.tile >= tiles_.x * tiles_.y; });
+  std::stable_sort(preferred_.begin(), preferred_.end(), [](const auto& a, const auto& b) { return a.tile < b.tile; });
+  std::size_t kept = 0;  // one job a tile: a tile has one writer
+  for (const auto& request : std::vector<CoarseRequest>(preferred_)) {
+    if (kept > 0 && preferred_[kept - 1].tile == request.tile)
+      preferred_[kept - 1].mask |= request.mask;
+    else
+      preferred_[kept++] = request;
+  }
+  preferred_.resize(kept);
+  preferred_cursor_ = 0;  // what was done is done: shading it again takes no samples
 }
 
-}  // namespace
+TileJob CoarseRounds::job_for(std::uint32_t tile, const TexelMask& mask) const {
+  TileJob job;
+  job.tile = TileId(level_, tile);
+  job.mask = mask;
+  job.passes = 1;
+  job.most = std::max(round_, 1u);
+  job.cost = static_cast<std::uint32_t>(mask.count());
+  job.coarse = true;
+  return job;
+}
 
 std::vector<TileJob> CoarseRounds::next_batch(std::uint64_t samples) {
   std::vector<TileJob> jobs;
   if (finished()) return jobs;
   std::uint64_t taken = 0;
-  const TexelMask mask = round_ == 0 ? every_fourth() : TexelMask::all();
+  if (opening() && preferred_cursor_ < preferred_.size()) {
+    for (; preferred_cursor_ < preferred_.size() && taken < samples; ++preferred_cursor_) {
+      const auto& wanted = preferred_[preferred_cursor_];
+      jobs.push_back(job_for(wanted.tile, wanted.mask));
+      taken += jobs.back().cost;
+    }
+    return jobs;
+  }
   for (; cursor_ < tiles_.x * tiles_.y && taken < samples; ++cursor_) {
-    TileJob job;
-    job.tile = TileId(level_, cursor_);
-    job.mask = mask;
-    job.passes = 1;
-    job.most = std::max(round_, 1u);
-    job.cost = static_cast<std::uint32_t>(mask.count());
-    job.coarse = true;
-    taken += job.cost;
-    jobs.push_back(job);
+    jobs.push_back(job_for(cursor_, TexelMask::all()));
+    taken += jobs.back().cost;
   }
   return jobs;
 }
 
 bool CoarseRounds::batch_finished() {
-  if (finished() || cursor_ < tiles_.x * tiles_.y) return false;
+  if (finished()) return false;
+  if (opening() && !preferred_.empty() && preferred_cursor_ == preferred_.size()) {
+    opened_ = true;
+    return true;
+  }
+  if (cursor_ < tiles_.x * tiles_.y) return false;
   const std::uint32_t done = round_++;
   cursor_ = 0;
   return done == 0 || std::has_single_bit(done) || done == rounds_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "actors/renderer/tile_display.hpp"
@@ -19,8 +20,8 @@ struct CoarsePicture {
   std::vector<std::uint8_t> rgb;
 };
 
-/// Round 0 shades every fourth texel (a first picture in a quarter of the time), round r then brings every texel to r
-/// samples. A picture is due after rounds 0, 1, 2, 4, 8, ... and the last.
+/// Round 0 is every tile's first pass (see shade_tile), round r then brings every texel to r samples. A picture is due
+/// after the tiles that a view asked for, and after rounds 0, 1, 2, 4, 8, ... and the last.
 class CoarseRounds {
  public:
   /// `rounds` 0: the coarse level is left alone.
@@ -28,8 +29,9 @@ class CoarseRounds {
 
   [[nodiscard]] bool finished() const { return round_ > rounds_ || rounds_ == 0; }
   /// Before the first picture: until a client has it, nothing else can be shown.
-  [[nodiscard]] bool opening() const { return round_ == 0 && !finished(); }
-  [[nodiscard]] bool first_pass_done() const { return round_ > 1 || finished(); }
+  [[nodiscard]] bool opening() const { return round_ == 0 && !opened_ && !finished(); }
+  /// What somebody sees now: while the first picture is not there, it comes first and is enough for one.
+  void prefer(std::span<const CoarseRequest> seen);
   [[nodiscard]] int level() const { return level_; }
   [[nodiscard]] const LevelTiles& tiles() const { return tiles_; }
 
@@ -41,11 +43,16 @@ class CoarseRounds {
   bool batch_finished();
 
  private:
+  [[nodiscard]] TileJob job_for(std::uint32_t tile, const TexelMask& mask) const;
+
   int level_;
   LevelTiles tiles_;
   std::uint32_t rounds_;
   std::uint32_t round_ = 0;
   std::uint32_t cursor_ = 0;
+  std::vector<CoarseRequest> preferred_;
+  std::size_t preferred_cursor_ = 0;
+  bool opened_ = false;  // the preferred texels are done
 };
 
 /// A coarse picture being put together; different tiles may be drawn from different threads.

@@ -57,6 +57,7 @@ struct LightTransport::Path {
   std::uint32_t bounce = 0;
   bool camera = false;     // sees through the backs of single-sided triangles
   bool suns_done = false;  // the vertex before took its suns by shadow rays alone
+  const StoredLight* stored = nullptr;
 };
 
 LightTransport::LightTransport(std::shared_ptr<const scene::Scene> scene, std::shared_ptr<const trace::RayScene> rays,
@@ -67,9 +68,8 @@ LightTransport::LightTransport(std::shared_ptr<const scene::Scene> scene, std::s
   has_sky_ = scene_->sky.emits();
 }
 
-bool LightTransport::sees_black(const trace::Surface& s) const {
-  const auto& m = *s.placed->material;
-  return !s.front && !m.double_sided && !(m.thickness > 0 && m.transmission > 0);
+bool LightTransport::sees_black(const scene::Material& m, bool front) {
+  return !front && !m.double_sided && !(m.thickness > 0 && m.transmission > 0);
 }
 
 // Share of light that reaches `s` along `direction` (not unit: up to `target`, if given).
@@ -221,6 +221,23 @@ glm::vec3 LightTransport::emission_seen(const Path& path, const trace::Surface& 
   return m.emission * mis_weight(path.pdf, light_pdf * glm::dot(to, to) / cosine);
 }
 
+// Adds what is stored of the diffuse light of `s`, and takes its lobe out. True: the path ends here. Surfaces that emit
+// are left to the path: their own light is not part of what is stored and would have to be told apart.
+bool LightTransport::end_in_stored_light(Path& path, const trace::Surface& s, const MaterialPoint& m, Bsdf& scatter,
+                                         Sampler& sampler, glm::vec3& light) {
+  const glm::vec3 way = s.position - path.from;
+  const float least = path.stored->least_distance();
+  if (m.unlit || largest(s.placed->material->emissive) > 0 || glm::dot(way, way) < least * least) return false;
+  glm::vec3 known;
+  if (!path.stored->find(s, sampler.next_2d(), known)) return false;
+  light += path.throughput * scatter.take_diffuse() * known;
+  // The other lobes of most surfaces scatter a twentieth of the light: one path in twenty goes on for them.
+  const float goes_on = std::min(scatter.scattered(), 1.0f);
+  if (!(sampler.next_1d() < goes_on)) return true;
+  path.throughput /= goes_on;
+  return false;
+}
+
 glm::vec3 LightTransport::trace_path(Path path, Sampler& sampler) const {
   glm::vec3 light(0.0f);
   trace::Surface s;
@@ -230,7 +247,8 @@ glm::vec3 LightTransport::trace_path(Path path, Sampler& sampler) const {
     if (sees_black(s)) return light;
     light += path.throughput * emission_seen(path, s, m);
     if (m.unlit || path.bounce >= options_.max_bounces) return light;
-    const BsdfScatter scatter(s, m, -path.ray.direction);
+    BsdfScatter scatter(s, m, -path.ray.direction);
+    if (path.stored != nullptr && end_in_stored_light(path, s, m, scatter, sampler, light)) return light;
     light += path.throughput *
              (suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, 1) + emitters_at(s, scatter, sampler));
     const BsdfSample next = scatter.sample(sampler);
@@ -251,11 +269,14 @@ glm::vec3 LightTransport::trace_path(Path path, Sampler& sampler) const {
   }
 }
 
-ViewIndependentLight LightTransport::diffuse_light(const trace::Surface& s, Sampler& sampler) const {
+glm::vec3 LightTransport::sharp_diffuse(const trace::Surface& s, Sampler& sampler) const {
   const DiffuseScatter scatter{s};
-  ViewIndependentLight made;
-  made.sharp = finite_or_black(suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, kMostPicks));
-  made.soft = emitters_at(s, scatter, sampler);
+  return finite_or_black(suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, kMostPicks));
+}
+
+glm::vec3 LightTransport::soft_diffuse(const trace::Surface& s, Sampler& sampler, const StoredLight* stored) const {
+  const DiffuseScatter scatter{s};
+  glm::vec3 soft = emitters_at(s, scatter, sampler);
   glm::vec3 t, b;
   trace::make_frame(s.normal, t, b);
   const glm::vec3 d = sample_cosine(sampler.next_2d());
@@ -268,10 +289,10 @@ ViewIndependentLight LightTransport::diffuse_light(const trace::Surface& s, Samp
     path.from = s.position;
     path.bounce = 1;
     path.suns_done = true;
-    made.soft += trace_path(path, sampler);
+    path.stored = stored;
+    soft += trace_path(path, sampler);
   }
-  made.soft = finite_or_black(made.soft);
-  return made;
+  return finite_or_black(soft);
 }
 
 ViewIndependentLight LightTransport::view_independent(const SurfacePoint& point, Sampler& sampler) const {
@@ -281,32 +302,44 @@ ViewIndependentLight LightTransport::view_independent(const SurfacePoint& point,
   const glm::vec3 albedo = m.diffuse_albedo();
   ViewIndependentLight made;
   if (largest(albedo) > 0) {
-    made = diffuse_light(s, sampler);
-    made.sharp *= albedo;
-    made.soft *= albedo;
+    made.sharp = sharp_diffuse(s, sampler) * albedo;
+    made.soft = soft_diffuse(s, sampler, nullptr) * albedo;
   }
   if (s.front || s.placed->material->double_sided) made.sharp += m.emission;
   return made;
 }
 
+glm::vec3 LightTransport::sharp_light(const SurfacePoint& point, Sampler& sampler) const {
+  const auto& material = *rays_->instance(point.instance).material;
+  if (sees_black(material, point.front) || !may_diffuse(material)) return glm::vec3(0.0f);
+  return sharp_diffuse(trace::make_surface(*rays_, point), sampler);
+}
+
+glm::vec3 LightTransport::soft_light(const SurfacePoint& point, Sampler& sampler, const StoredLight* stored) const {
+  const auto& material = *rays_->instance(point.instance).material;
+  if (sees_black(material, point.front) || !may_diffuse(material)) return glm::vec3(0.0f);
+  return soft_diffuse(trace::make_surface(*rays_, point), sampler, stored);
+}
+
 ViewIndependentLight LightTransport::irradiance(const SurfacePoint& point, Sampler& sampler) const {
   const auto s = trace::make_surface(*rays_, point);
   if (sees_black(s)) return {};
-  ViewIndependentLight made = diffuse_light(s, sampler);
-  made.sharp *= kPi;
-  made.soft *= kPi;
+  ViewIndependentLight made;
+  made.sharp = sharp_diffuse(s, sampler) * kPi;
+  made.soft = soft_diffuse(s, sampler, nullptr) * kPi;
   return made;
 }
 
 glm::vec3 LightTransport::diffuse_albedo(const SurfacePoint& point) const {
-  const auto s = trace::make_surface(*rays_, point);
-  return sees_black(s) ? glm::vec3(0.0f) : make_material_point(*scene_, s).diffuse_albedo();
+  const auto& placed = rays_->instance(point.instance);
+  if (sees_black(*placed.material, point.front)) return glm::vec3(0.0f);
+  return make_material_point(*scene_, placed, point.triangle, point.u, point.v).diffuse_albedo();
 }
 
 glm::vec3 LightTransport::emission(const SurfacePoint& point) const {
-  const auto s = trace::make_surface(*rays_, point);
-  if (!s.front && !s.placed->material->double_sided) return glm::vec3(0.0f);
-  return make_material_point(*scene_, s).emission;
+  const auto& placed = rays_->instance(point.instance);
+  if (!point.front && !placed.material->double_sided) return glm::vec3(0.0f);
+  return make_material_point(*scene_, placed, point.triangle, point.u, point.v).emission;
 }
 
 float LightTransport::alpha(const SurfacePoint& point) const {
@@ -337,7 +370,8 @@ glm::vec3 LightTransport::view_independent_radiance(const trace::Ray& camera_ray
     if (!sees_black(s)) {
       const glm::vec3 albedo = m.diffuse_albedo();
       glm::vec3 own = s.front || s.placed->material->double_sided ? m.emission : glm::vec3(0.0f);
-      if (largest(albedo) > 0 && m.alpha > 0) own += albedo * diffuse_light(s, sampler).sum();
+      if (largest(albedo) > 0 && m.alpha > 0)
+        own += albedo * (sharp_diffuse(s, sampler) + soft_diffuse(s, sampler, nullptr));
       light += path.throughput * own * m.alpha;
     }
     if (!may_pass(*s.placed->material)) return light;

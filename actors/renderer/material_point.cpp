@@ -34,13 +34,14 @@ class TexturePoint {
 
 }  // namespace
 
-MaterialPoint make_material_point(const scene::Scene& scene, const trace::Surface& s) {
-  const auto& m = *s.placed->material;
-  const auto& mesh = *s.placed->mesh;
-  TexturePoint textures(scene, mesh, s.triangle, s.u, s.v);
+MaterialPoint make_material_point(const scene::Scene& scene, const trace::WorldInstance& placed, std::uint32_t triangle,
+                                  float u, float v) {
+  const auto& m = *placed.material;
+  const auto& mesh = *placed.mesh;
+  TexturePoint textures(scene, mesh, triangle, u, v);
   glm::vec4 base = m.base_color;
   if (m.base_color_texture.present()) base *= textures.read(m.base_color_texture, TextureEncoding::kSrgb);
-  if (!mesh.colors.empty()) base *= scene::interpolate_color(mesh, s.triangle, s.u, s.v);
+  if (!mesh.colors.empty()) base *= scene::interpolate_color(mesh, triangle, u, v);
   MaterialPoint p;
   p.base = glm::clamp(glm::vec3(base), 0.0f, 1.0f);
   if (m.alpha_mode == scene::AlphaMode::kBlend) p.alpha = std::clamp(base.w, 0.0f, 1.0f);

@@ -61,11 +61,22 @@ struct MaterialPoint {
   }
 };
 
-[[nodiscard]] MaterialPoint make_material_point(const scene::Scene& scene, const trace::Surface& surface);
+[[nodiscard]] MaterialPoint make_material_point(const scene::Scene& scene, const trace::WorldInstance& placed,
+                                                std::uint32_t triangle, float u, float v);
+[[nodiscard]] inline MaterialPoint make_material_point(const scene::Scene& scene, const trace::Surface& s) {
+  return make_material_point(scene, *s.placed, s.triangle, s.u, s.v);
+}
 
 /// Emitted radiance only (the cheap part of the above), of a side that emits.
 [[nodiscard]] glm::vec3 emitted_radiance(const scene::Scene& scene, const trace::WorldInstance& placed,
                                          std::uint32_t triangle, float u, float v);
+
+/// False if no point of the material has a diffuse lobe, whatever its textures say.
+[[nodiscard]] inline bool may_diffuse(const scene::Material& m) {
+  const bool metal = m.metallic >= 1.0f && !m.metallic_roughness_texture.present();
+  const bool clear = m.transmission >= 1.0f && !m.transmission_texture.present();
+  return !m.unlit && !metal && !clear;
+}
 
 /// True if rays may pass the material's surface unscattered (BLEND, thin transmission).
 [[nodiscard]] inline bool may_pass(const scene::Material& m) {

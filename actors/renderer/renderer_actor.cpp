@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/texel_shading.hpp"
 
 namespace darm::renderer {
@@ -16,8 +17,7 @@ namespace {
 
 constexpr std::size_t kPicturesPerSlice = 24;
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
-constexpr std::uint64_t kDisplayVersion = 1;
-constexpr float kCountWithoutFilter = 512;  // texels of more samples need no albedo: they are never filtered
+constexpr std::uint64_t kDisplayVersion = 2;
 
 // What a stored picture depends on beside its light.
 std::uint64_t picture_tag_of(const DisplayOptions& display) {
@@ -72,6 +72,7 @@ struct RendererActor::Batch {
   std::vector<TileJob> jobs;
   std::vector<JobResult> results;  // each written by the one slice that runs the job
   std::shared_ptr<CoarseCanvas> canvas;
+  std::shared_ptr<StoredLight> light;  // of the same tiles
 };
 
 RendererActor::RendererActor(runtime::Context<Inbox> context, RendererParts parts)
@@ -127,9 +128,7 @@ std::vector<TileJob> RendererActor::choose_jobs() {
   const auto& options = shared_->parts.options;
   const double budget = std::max(64.0, double{options.batch_ms} * 1000.0 * executor().workers() / sample_us_);
   if (coarse_.opening()) return coarse_.next_batch(static_cast<std::uint64_t>(budget));
-  const double share = coarse_.finished()          ? 0.0
-                       : coarse_.first_pass_done() ? double{options.coarse_share}
-                                                   : double{options.coarse_first_share};
+  const double share = coarse_.finished() ? 0.0 : double{options.coarse_share};
   auto jobs = schedule_.next_batch(static_cast<std::uint64_t>(budget * (1.0 - share)));
   // The coarse level earns its share of what visible tiles cost; with nothing visible it has all.
   std::uint64_t cost = 0;
@@ -167,6 +166,7 @@ void RendererActor::begin_batch() {
     static const std::vector<TileRequest> kNothing;
     schedule_.replace(waiting_->work ? *waiting_->work : kNothing,
                       [this](TileId tile) { return shared_->parts.store->has(tile); });
+    coarse_.prefer(waiting_->coarse);
     waiting_.reset();
     if (begin_recall()) return;
   }
@@ -235,9 +235,8 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
   const LevelTiles level = shared.level_of(job.tile);
   const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces, *shared.parts.store);
   const float least = result.shading.progress.least;
-  if (!facts || result.shading.progress.mean <= 0 || least >= kCountWithoutFilter) return;
-  if (!facts->learn_albedo(*surface, job.mask, least < 2 || result.shading.samples == 0 ? 1 : least < 8 ? 4 : 8))
-    return;
+  if (!facts || result.shading.progress.mean <= 0) return;
+  if (!facts->learn_albedo(*surface, job.mask, least < 1 ? 2 : least < 2 ? 4 : least < 16 ? 16 : 32)) return;
   if (auto update = shared.parts.store->begin_update(job.tile)) update->put_albedo(facts->albedo_means);
 }
 
@@ -302,6 +301,7 @@ void RendererActor::begin_pictures() {
 
 void RendererActor::add_coarse_pictures(Batch& batch, bool recall) {
   batch.canvas = std::make_shared<CoarseCanvas>(coarse_.tiles(), ++coarse_number_);
+  if (shared_->parts.layout) batch.light = std::make_shared<StoredLight>(shared_->parts.layout);
   for (std::uint32_t t = 0; t < coarse_.tiles().x * coarse_.tiles().y; ++t) {
     TileJob job;
     job.tile = TileId(coarse_.level(), t);
@@ -324,14 +324,16 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
   const TileJob& job = batch.jobs[index];
   auto& store = *shared.parts.store;
   std::optional<TilePicture> picture;
+  TileDisplay display(store, shared.facts, shared.parts.options.display);
   if (job.recall) {
     if (const auto stored = store.picture(job.tile, shared.picture_tag)) picture = from_stored(*stored);
   } else {
-    TileDisplay display(store, shared.facts, shared.parts.options.display);
     picture = display.draw(job.tile, shared.level_of(job.tile), job.mask);
     if (picture && job.keep) store.put_picture(job.tile, shared.picture_tag, to_stored(*picture));
   }
   if (job.coarse) {
+    if (const auto light = store.read(job.tile); light && batch.light)
+      batch.light->put(job.tile.index(), stored_texels(*light, display.filtered()));
     if (picture) batch.canvas->put(job.tile.index(), *picture->image);
   } else {
     batch.results[index].picture = std::move(picture);
@@ -367,6 +369,7 @@ void RendererActor::finish_pictures() {
         for (const TileId t : names) schedule_.forget_picture(t);
     }
   }
+  if (batch_->light) shared_->parts.surfaces->use_stored_light(batch_->light);  // no slice runs now
   if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
   begin_batch();
 }

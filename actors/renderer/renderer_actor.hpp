@@ -24,15 +24,15 @@ struct RendererOptions {
   float slice_ms = 6;   ///< work of one pool slice
   float batch_ms = 40;  ///< of shading between two rounds of pictures: how soon a new working set takes hold
   std::uint32_t coarse_rounds = 64;  ///< samples a texel of the coarse level; 0: it is left alone
-  float coarse_share = 0.1f;        ///< of shading while clients are served, once the coarse level's first pass is done
-  float coarse_first_share = 0.3f;  ///< before that
+  float coarse_share = 0.1f;         ///< of shading while clients are served, once the coarse level has a first picture
 };
 
 /// What the renderer works with; everything but the options is shared with pool work and must be non-null.
 struct RendererParts {
-  std::shared_ptr<const TileSurfaces> surfaces;  ///< make_scene_surfaces()
-  std::shared_ptr<atlas::RadianceStore> store;   ///< the renderer is its only writer, and reader while it runs
-  std::vector<LevelTiles> levels;                ///< level_tiles_of()
+  std::shared_ptr<TileSurfaces> surfaces;       ///< make_scene_surfaces(); the renderer alone calls use_stored_light()
+  std::shared_ptr<atlas::RadianceStore> store;  ///< the renderer is its only writer, and reader while it runs
+  std::vector<LevelTiles> levels;               ///< level_tiles_of()
+  std::shared_ptr<const atlas::Layout> layout;  ///< null: light is not stored for paths to end in
   RendererOptions options;
   runtime::Ref<tile_scheduler::Inbox> scheduler;  ///< gets TilesShaded
   /// Gets each new picture of the coarse level, on the renderer's turn. May be empty.

@@ -21,11 +21,18 @@ struct TileRequest {
   TexelMask mask;
 };
 
+/// Texels of a tile of the coarse level that somebody sees.
+struct CoarseRequest {
+  std::uint32_t tile = 0;  ///< index within the level
+  TexelMask mask;
+};
+
 /// The whole working set, replacing the one before. What is not in it is not shaded.
 struct ShadeTiles {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
   std::shared_ptr<const std::vector<TileRequest>> work;
-  std::uint64_t working_set = 0;  ///< increases with each message
+  std::uint64_t working_set = 0;      ///< increases with each message
+  std::vector<CoarseRequest> coarse;  ///< what is seen of the coarse level; a tile may come more than once
 
   ShadeTiles(std::shared_ptr<const std::vector<TileRequest>> tiles, std::uint64_t number)
       : work(std::move(tiles)), working_set(number) {}

@@ -14,8 +14,6 @@ using atlas::Plane;
 
 namespace {
 
-constexpr float kLeastAlbedo = 1e-3f;
-
 float grey_of(const glm::vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
@@ -69,20 +67,14 @@ void TileDisplay::gather(int radius) {
       const int texel = row.texel * kTileSize + column.texel;
       if (!from.facts) continue;
       window_.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
-      if (!from.light || !from.facts->knows_albedo(texel) || window_.patch[at] == kNobody) continue;
+      if (!from.light || window_.patch[at] == kNobody) continue;
       const float n = from.light->count(Layer::kSoft, texel);
-      const glm::vec3 albedo = from.facts->albedo(texel);
-      const float grey = grey_of(albedo);
-      if (n <= 0 || grey < kLeastAlbedo) continue;
+      if (n <= 0) continue;
       const glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
       window_.count[at] = n;
-      for (int c = 0; c < 3; ++c) {
-        if (albedo[c] < kLeastAlbedo) continue;
-        window_.irradiance[static_cast<std::size_t>(c)][at] = soft[c] / albedo[c];
-        window_.trust[static_cast<std::size_t>(c)][at] = n;
-      }
-      window_.grey[at] = grey_of(soft) / grey;
-      window_.grey_m2[at] = from.light->plane(Plane::kSoftM2)[texel] / (grey * grey);
+      for (int c = 0; c < 3; ++c) window_.irradiance[static_cast<std::size_t>(c)][at] = soft[c];
+      window_.grey[at] = grey_of(soft);
+      window_.grey_m2[at] = from.light->plane(Plane::kSoftM2)[texel];
     }
   }
 }
@@ -96,24 +88,26 @@ void TileDisplay::shade_slot(std::vector<float>& variance, SlotColours& colours)
       const auto& from = around_[static_cast<std::size_t>(row.tile * 3 + column.tile)];
       const auto at = static_cast<std::size_t>(y * kSlotSize + x);
       const int texel = row.texel * kTileSize + column.texel;
-      if (from.facts) colours.fill.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
-      if (!from.light || from.light->count(Layer::kSoft, texel) <= 0) continue;
+      if (!from.facts) continue;
+      colours.fill.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
+      if (!from.light || from.light->count(Layer::kSharp, texel) <= 0 || !from.facts->knows_albedo(texel)) continue;
+      const auto& f = filtered_[at];
+      if (!f.known && from.light->count(Layer::kSoft, texel) <= 0) continue;  // filled from those that have it
       const glm::vec3 sharp = from.light->mean(Layer::kSharp, texel);
       glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
       const float grey_sharp = grey_of(sharp);
       const float grey_soft = grey_of(soft);
       float soft_variance = from.light->variance_of_mean(Layer::kSoft, texel, grey_soft * grey_soft);
-      const auto& f = filtered_[at];
-      if (f.known && from.facts) {
-        const glm::vec3 albedo = from.facts->albedo(texel);
-        for (int c = 0; c < 3; ++c)
-          if (albedo[c] >= kLeastAlbedo) soft[c] = f.irradiance[static_cast<std::size_t>(c)] * albedo[c];
-        soft_variance = f.variance * grey_of(albedo) * grey_of(albedo);
+      if (f.known) {
+        soft = {f.irradiance[0], f.irradiance[1], f.irradiance[2]};
+        soft_variance = f.variance;
       }
+      const glm::vec3 albedo = from.facts->albedo(texel);
       // One shadow ray a sample: a lone sample is mostly right, so its unknown spread is taken as half its value.
       variance[at] =
-          soft_variance + from.light->variance_of_mean(Layer::kSharp, texel, 0.25f * grey_sharp * grey_sharp);
-      const glm::vec3 all = (sharp + soft) * options_.exposure;
+          grey_of(albedo) * grey_of(albedo) *
+          (soft_variance + from.light->variance_of_mean(Layer::kSharp, texel, 0.25f * grey_sharp * grey_sharp));
+      const glm::vec3 all = ((sharp + soft) * albedo + from.facts->emission(texel)) * options_.exposure;
       colours.fill.set(static_cast<int>(at), {all.x, all.y, all.z});
     }
   }
@@ -128,10 +122,9 @@ float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const
     if (!mask.test(t)) continue;
     const auto at = static_cast<std::size_t>((t / kTileSize + 1) * kSlotSize + t % kTileSize + 1);
     if (around_[4].facts && around_[4].facts->patch[static_cast<std::size_t>(t)] == kNobody) continue;
-    const float n = around_[4].light ? around_[4].light->count(Layer::kSoft, t) : 0.0f;
     ++texels;
-    count += n;
-    if (n <= 0) {
+    if (around_[4].light) count += around_[4].light->count(Layer::kSoft, t);
+    if (!around_[4].light || around_[4].light->count(Layer::kSharp, t) <= 0) {
       squares += 0.25 * 0.25;  // filled from neighbours: nothing is known of it
       continue;
     }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "actors/atlas/radiance_store.hpp"
@@ -33,6 +34,9 @@ class TileDisplay {
   /// The slot's 32x32 texels: payload and border (from the neighbour tiles where they are shaded), soft light filtered,
   /// unshaded texels filled from their patch, then from anything. nullopt if no texel of the slot was ever shaded.
   std::optional<TilePicture> draw(TileId id, const LevelTiles& level, const TexelMask& mask);
+
+  /// The soft light of the slot drawn last as it was filtered; not known where it was not.
+  [[nodiscard]] std::span<const FilteredTexel> filtered() const { return filtered_; }
 
  private:
   struct Neighbour {

@@ -16,8 +16,12 @@ bool TileFacts::learn_albedo(const TileSurface& surface, const TexelMask& wanted
     const auto at = static_cast<std::size_t>(texel);
     if (!wanted.test(texel) || points[at] >= goal) continue;
     glm::vec3 sum = albedo(texel) * static_cast<float>(points[at]);
-    for (int i = points[at]; i < goal; ++i)
+    glm::vec3 shine = emission(texel) * static_cast<float>(points[at]);
+    for (int i = points[at]; i < goal; ++i) {
       if (const auto a = surface.albedo(texel, static_cast<std::uint32_t>(i))) sum += *a;
+      if (!emission_means.empty()) shine += surface.emission(texel, static_cast<std::uint32_t>(i));
+    }
+    if (!emission_means.empty()) emission_means[at] = shine / static_cast<float>(goal);
     const glm::vec3 mean = sum / static_cast<float>(goal);
     for (int c = 0; c < 3; ++c) {
       const float a = mean[c] > 0.0f ? std::min(mean[c], 1.0f) : 0.0f;  // NaN becomes 0: not filtered
@@ -84,7 +88,10 @@ std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const LevelTiles& leve
   auto facts = std::make_shared<TileFacts>();
   for (int t = 0; t < kTileTexels; ++t) facts->patch[static_cast<std::size_t>(t)] = surface->patch(t);
   facts->coverage = cover_tile(id, level, surfaces);
-  if (const auto stored = store.read(id)) facts->albedo_means = stored->albedo();
+  if (surface->emits())
+    facts->emission_means.assign(kTileTexels, glm::vec3(0.0f));  // not stored: learned together with albedo
+  else if (const auto stored = store.read(id))
+    facts->albedo_means = stored->albedo();
 
   const std::scoped_lock lock(mutex_);
   if (const auto it = entries_.find(id); it != entries_.end()) return it->second.facts;

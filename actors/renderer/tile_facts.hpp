@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <unordered_map>
+#include <vector>
 
 #include "actors/atlas/radiance_store.hpp"
 #include "actors/renderer/tile_surface.hpp"
@@ -16,10 +17,12 @@
 
 namespace darm::renderer {
 
-/// About 10 KB a tile. Albedo is averaged over a few points of each texel, only where somebody has shaded.
+/// About 10 KB a tile. Albedo and emission are averaged over a few points of each texel, only where somebody has
+/// shaded.
 struct TileFacts {
   std::array<std::uint32_t, kTileTexels> patch{};
   atlas::TileAlbedo albedo_means;
+  std::vector<glm::vec3> emission_means;         ///< per texel, nits, of the same points; empty: nothing emits
   std::shared_ptr<const CoverageTile> coverage;  ///< null: opaque
 
   [[nodiscard]] bool knows_albedo(int texel) const { return albedo_means.points[static_cast<std::size_t>(texel)] > 0; }
@@ -27,8 +30,12 @@ struct TileFacts {
     const auto& a = albedo_means.bits[static_cast<std::size_t>(texel)];
     return glm::vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f);
   }
-  /// Brings the albedo of each texel of `wanted` to a mean of `wanted_points` points: few at first, so that the first
-  /// picture comes soon, more when light is exact enough to show the difference. True if something was learned.
+  [[nodiscard]] glm::vec3 emission(int texel) const {
+    return emission_means.empty() ? glm::vec3(0.0f) : emission_means[static_cast<std::size_t>(texel)];
+  }
+  /// Brings albedo and emission of each texel of `wanted` to a mean of `wanted_points` points: few at first, so that
+  /// the first picture comes soon, more when light is exact enough to show the difference. True if something was
+  /// learned.
   bool learn_albedo(const TileSurface& surface, const TexelMask& wanted, int wanted_points = 4);
 };
 

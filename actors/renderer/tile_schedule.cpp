@@ -52,12 +52,14 @@ TileSchedule::Need TileSchedule::need_of(const State& s) const {
   return finished(s) ? Need::kNothing : Need::kMore;
 }
 
-// Variance falls as v/n: one more sample for each of t texels gains about w * (v/n) / n for the price of t samples.
+// Variance falls as v/n (after a first pass n is a quarter): one more sample for each of t texels gains about w * (v/n)
+// / n for the price of t samples.
 double TileSchedule::gain_of(const State& s, Need need) const {
   const double weight = (s.display ? 1.0 : kHiddenShare) * (double{s.weight} + 1e-9);
   if (need != Need::kMore) return weight;
-  const double n = std::max(double{s.progress.mean}, 1.0);
-  const double error = s.error > 0 ? s.error * std::sqrt(std::max(s.pictured_mean, 1.0f) / n) : 0.3 / std::sqrt(n);
+  const double n = std::max(double{s.progress.mean}, 0.25);
+  const double error =
+      s.error > 0 ? s.error * std::sqrt(std::max(double{s.pictured_mean}, 0.25) / n) : 0.3 / std::sqrt(n);
   return weight * error * error / (n * std::max(s.progress.texels, 1u));
 }
 
@@ -70,12 +72,12 @@ TileJob TileSchedule::job_for(TileId tile, const State& s, Need need) const {
     job.cost = kSurveyCost;
   } else if (need == Need::kFirst) {
     job.passes = 1;
-    job.cost = s.surveyed ? s.progress.unshaded : static_cast<std::uint32_t>(s.mask.count());
+    job.cost = (s.surveyed ? s.progress.unshaded : static_cast<std::uint32_t>(s.mask.count())) * 5 / 4;
   } else {
     const std::uint32_t fit = options_.job_samples / std::max(s.progress.texels, 1u);
     const auto half = static_cast<std::uint32_t>(s.progress.least / 2);
     job.passes = std::max(1u, std::min(fit, half));
-    job.cost = job.passes * s.progress.texels;
+    job.cost = 2 * job.passes * s.progress.texels;  // both layers
   }
   job.cost = std::max(job.cost, 1u);
   return job;

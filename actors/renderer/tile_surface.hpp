@@ -11,11 +11,7 @@
 
 namespace darm::renderer {
 
-/// One sample of the light that leaves a texel and does not depend on the eye, nits. See atlas::Layer.
-struct TexelLight {
-  glm::vec3 sharp{0.0f};
-  glm::vec3 soft{0.0f};
-};
+class StoredLight;
 
 inline constexpr std::uint32_t kNobody = 0xffffffffu;
 
@@ -25,11 +21,17 @@ class TileSurface {
   virtual ~TileSurface() = default;
   /// Patch that owns the texel (gutter included), or kNobody.
   [[nodiscard]] virtual std::uint32_t patch(int texel) const = 0;
-  /// Sample number `sample` of the texel's light: a random point of the texel's box, a random path from it. The same
-  /// number gives the same sample. nullopt: nothing of the patch under it.
-  [[nodiscard]] virtual std::optional<TexelLight> light(int texel, std::uint32_t sample) const = 0;
+  /// Sample number `sample` of irradiance / pi, nits, one layer of it (atlas::Layer): a random point of the texel's
+  /// box, a random path from it. Times albedo, plus emission, it is the light that leaves the texel whatever the eye.
+  /// The same number gives the same sample. nullopt: nothing of the patch under it.
+  [[nodiscard]] virtual std::optional<glm::vec3> sharp(int texel, std::uint32_t sample) const = 0;
+  [[nodiscard]] virtual std::optional<glm::vec3> soft(int texel, std::uint32_t sample) const = 0;
   /// What reflected light is multiplied with at point `sample` of the texel, 0..1 a channel.
   [[nodiscard]] virtual std::optional<glm::vec3> albedo(int texel, std::uint32_t sample) const = 0;
+  /// Own radiance at that point, nits.
+  [[nodiscard]] virtual glm::vec3 emission(int texel, std::uint32_t sample) const = 0;
+  /// True if some texel's material emits light of its own.
+  [[nodiscard]] virtual bool emits() const = 0;
   /// Opacity at point `sample` of the texel, 0..1.
   [[nodiscard]] virtual std::optional<float> alpha(int texel, std::uint32_t sample) const = 0;
   /// True if some texel's material is alpha MASK or BLEND.
@@ -40,8 +42,10 @@ class TileSurface {
 class TileSurfaces {
  public:
   virtual ~TileSurfaces() = default;
-  /// Null outside the level.
+  /// Null outside the level. The surface samples with the stored light of the moment it was asked for.
   [[nodiscard]] virtual std::shared_ptr<const TileSurface> tile(TileId id) const = 0;
+  /// From now on paths end in `light` (null: in none). Not while another thread calls tile().
+  virtual void use_stored_light(std::shared_ptr<const StoredLight> light) { (void)light; }
 };
 
 /// Tiles of each level, for stepping to a neighbour.

@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kTriesForCover = 8;
 constexpr std::uint64_t kAlbedoSeed = 0xa1bed0;
+constexpr std::uint64_t kSoftSeed = 0x50f7;  // the two layers draw apart
 
 struct World {
   std::shared_ptr<const scene::Scene> scene;
@@ -37,19 +38,25 @@ struct World {
 
 class SceneTile : public TileSurface {
  public:
-  SceneTile(TileId id, std::shared_ptr<const World> world)
-      : id_(id), world_(std::move(world)), texels_(world_->mapper->tile(id)) {}
+  SceneTile(TileId id, std::shared_ptr<const World> world, std::shared_ptr<const StoredLight> stored)
+      : id_(id), world_(std::move(world)), stored_(std::move(stored)), texels_(world_->mapper->tile(id)) {}
 
   [[nodiscard]] std::uint32_t patch(int texel) const override {
     return index_of(texels_->patch_at(texel % kTileSize, texel / kTileSize));
   }
 
-  [[nodiscard]] std::optional<TexelLight> light(int texel, std::uint32_t sample) const override {
+  [[nodiscard]] std::optional<glm::vec3> sharp(int texel, std::uint32_t sample) const override {
     Sampler sampler(world_->seed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
     const auto point = covered_point(texel, sampler);
     if (!point) return std::nullopt;
-    const auto light = world_->transport->view_independent(*point, sampler);
-    return TexelLight{light.sharp, light.soft};
+    return world_->transport->sharp_light(*point, sampler);
+  }
+
+  [[nodiscard]] std::optional<glm::vec3> soft(int texel, std::uint32_t sample) const override {
+    Sampler sampler(world_->seed + kSoftSeed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
+    const auto point = covered_point(texel, sampler);
+    if (!point) return std::nullopt;
+    return world_->transport->soft_light(*point, sampler, stored_.get());
   }
 
   [[nodiscard]] std::optional<glm::vec3> albedo(int texel, std::uint32_t sample) const override {
@@ -59,7 +66,25 @@ class SceneTile : public TileSurface {
     return world_->transport->diffuse_albedo(*point);
   }
 
+  [[nodiscard]] glm::vec3 emission(int texel, std::uint32_t sample) const override {
+    Sampler sampler(kAlbedoSeed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
+    const auto point = covered_point(texel, sampler);
+    return point ? world_->transport->emission(*point) : glm::vec3(0.0f);
+  }
+
+  [[nodiscard]] bool emits() const override {
+    return std::any_of(texels_->fragments().begin(), texels_->fragments().end(), [this](const auto& f) {
+      const auto& material = world_->material_of(f.instance);
+      return material.emits() || material.unlit;
+    });
+  }
+
   [[nodiscard]] std::optional<float> alpha(int texel, std::uint32_t sample) const override {
+    const auto candidates = texels_->candidates(texel % kTileSize, texel / kTileSize);
+    if (candidates.empty()) return std::nullopt;
+    // A texel belongs to one patch, a patch to one mesh, a mesh has one material.
+    const auto& material = world_->material_of(texels_->fragment(candidates.front()).instance);
+    if (material.alpha_mode == scene::AlphaMode::kOpaque) return 1.0f;
     Sampler sampler(kAlbedoSeed, hash_pair(id_.packed, static_cast<std::uint32_t>(texel)), sample);
     const auto point = texels_->sample(texel % kTileSize, texel / kTileSize, sampler.next_2d());
     if (!point) return std::nullopt;
@@ -86,6 +111,7 @@ class SceneTile : public TileSurface {
 
   TileId id_;
   std::shared_ptr<const World> world_;
+  std::shared_ptr<const StoredLight> stored_;
   std::shared_ptr<const atlas::TileTexels> texels_;
 };
 
@@ -97,19 +123,20 @@ class SceneSurfaces : public TileSurfaces {
     if (static_cast<std::size_t>(id.level()) >= levels.size()) return nullptr;
     const auto& level = levels[static_cast<std::size_t>(id.level())];
     if (id.index() >= level.tiles_x * level.tiles_y) return nullptr;
-    return std::make_shared<SceneTile>(id, world_);
+    return std::make_shared<SceneTile>(id, world_, stored_);
   }
+  void use_stored_light(std::shared_ptr<const StoredLight> light) override { stored_ = std::move(light); }
 
  private:
   std::shared_ptr<const World> world_;
+  std::shared_ptr<const StoredLight> stored_;
 };
 
 }  // namespace
 
-std::shared_ptr<const TileSurfaces> make_scene_surfaces(std::shared_ptr<const scene::Scene> scene,
-                                                        std::shared_ptr<const atlas::TexelMapper> mapper,
-                                                        std::shared_ptr<const LightTransport> transport,
-                                                        std::uint64_t seed) {
+std::shared_ptr<TileSurfaces> make_scene_surfaces(std::shared_ptr<const scene::Scene> scene,
+                                                  std::shared_ptr<const atlas::TexelMapper> mapper,
+                                                  std::shared_ptr<const LightTransport> transport, std::uint64_t seed) {
   auto world = std::make_shared<World>();
   world->scene = std::move(scene);
   world->mapper = std::move(mapper);

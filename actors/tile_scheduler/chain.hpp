@@ -32,6 +32,9 @@ struct WeightedChain {
 /// What a chain loses when served at position 0..3 or by CoarseTex, in any one unit.
 using ChainLoss = std::array<float, kChainLength + 1>;
 
+/// Steps of SampleTaps per texel.
+inline constexpr std::uint32_t kTapSteps = 8;
+
 /// Where one sample of a chain looks, in eighths of a texel: into the slot at each of its positions, and into CoarseTex
 /// (at most 2048 a side).
 struct SampleTaps {

@@ -237,7 +237,10 @@ void TileSchedulerActor::send_work() {
   std::vector<const std::vector<renderer::TileRequest>*> views;
   for (const auto& [id, session] : sessions_) views.push_back(&session->demand.requests);
   auto work = std::make_shared<const std::vector<renderer::TileRequest>>(join_requests(views));
-  peers_->renderer().tell(renderer::ShadeTiles(std::move(work), next_working_set_++));
+  renderer::ShadeTiles message(std::move(work), next_working_set_++);
+  for (const auto& [id, session] : sessions_)
+    message.coarse.insert(message.coarse.end(), session->demand.coarse.begin(), session->demand.coarse.end());
+  peers_->renderer().tell(std::move(message));
 }
 
 void TileSchedulerActor::compose(Session& session) {

@@ -96,6 +96,24 @@ bool has_image(const ImageLookup& images, TileId tile) {
 
 }  // namespace
 
+std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, const atlas::Layout& layout) {
+  const auto& level = layout.levels.back();
+  TileIndex tiles;
+  std::vector<renderer::CoarseRequest> out;
+  for (const auto& taps : seen.taps()) {
+    const auto x = static_cast<int>(taps.coarse[0] / kTapSteps), y = static_cast<int>(taps.coarse[1] / kTapSteps);
+    for (int v = std::max(0, y - 1); v <= std::min(y + 1, static_cast<int>(level.height) - 1); ++v)
+      for (int u = std::max(0, x - 1); u <= std::min(x + 1, static_cast<int>(level.width) - 1); ++u) {
+        const auto tile =
+            static_cast<std::uint32_t>(v / kTileSize) * level.tiles_x + static_cast<std::uint32_t>(u / kTileSize);
+        const auto number = tiles.insert(TileId(layout.coarse_level(), tile));
+        if (number == out.size()) out.push_back({tile, {}});
+        out[number].mask.set(u % kTileSize, v % kTileSize);
+      }
+  }
+  return out;
+}
+
 ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
                      const ImageLookup& images, const CoarseLuma* coarse, const AllocationOptions& options) {
   ViewDemand demand;
@@ -110,6 +128,7 @@ ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const P
   demand.target = allocate_slots(request, options);
   grant_available(demand, layout.coarse_level(), table, images, options);
   demand.requests = requests_of(set, layout, demand);
+  if (coarse == nullptr) demand.coarse = coarse_texels_seen(set.current(), layout);
   return demand;
 }
 

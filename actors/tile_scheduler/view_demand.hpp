@@ -22,7 +22,13 @@ struct ViewDemand {
   Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded
   Allocation granted;                           ///< the tiles it can have now: these get slots
   std::vector<renderer::TileRequest> requests;  ///< distinct tiles
+  std::vector<renderer::CoarseRequest> coarse;  ///< coarse_texels_seen(), while there is no CoarseTex
 };
+
+/// Texels of the coarse level around the set's taps: those that draw a sample, and their neighbours for the samples
+/// in between. One request a tile.
+[[nodiscard]] std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen,
+                                                                      const atlas::Layout& layout);
 
 /// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. `coarse`:
 /// see measure_losses().

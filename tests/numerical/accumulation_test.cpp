@@ -194,39 +194,43 @@ TEST_F(Accumulation, what_is_no_light_is_counted_and_never_stored) {
     for (const bool sharp : {false, true})
       for (const int channel : {0, 1, 2}) {
         renderer::MadeUpWorld world;
-        std::uint32_t expected = 0;
+        world.world.albedo = [](TileId, int, int) { return glm::vec3(1.0f); };
+        const auto is_bad = [](int texel, std::uint32_t sample) {
+          const bool always = texel % 7 == 0;  // its second try fails as well
+          return always || (sample < 0x80000000u && (texel + static_cast<int>(sample)) % 5 == 0);
+        };
         world.world.light = [&](TileId, int texel, std::uint32_t sample) {
           renderer::TexelLight light{glm::vec3(0.25f), glm::vec3(0.5f)};
-          const bool always = texel % 7 == 0;  // its second try fails as well
-          const bool once = sample < 0x80000000u && (texel + static_cast<int>(sample)) % 5 == 0;
-          if (always || once) (sharp ? light.sharp : light.soft)[channel] = value;
+          if (is_bad(texel, sample)) (sharp ? light.sharp : light.soft)[channel] = value;
           return light;
         };
-        const auto tile = TileId(0, static_cast<std::uint32_t>(next_++ % 9));
-        constexpr int kPasses = 4;
-        for (int t = 0; t < kTileTexels; ++t)
-          for (int s = 0; s < kPasses; ++s) expected += t % 7 == 0 || (t + s) % 5 == 0;
-        const auto before = renderer::survey_tile(*store_, tile, TexelMask::all(), *world.tile(tile));
-        const auto start = static_cast<int>(before.least);
-        if (start > 0) expected = 0;
-        for (int t = 0; t < kTileTexels && start > 0; ++t)
-          for (int s = start; s < start + kPasses; ++s) expected += t % 7 == 0 || (t + s) % 5 == 0;
-        const auto result = renderer::shade_tile(*store_, tile, TexelMask::all(), kPasses, *world.tile(tile)).value();
-        count.see(std::abs(static_cast<double>(result.quarantined) - expected), "value", value);
+        std::uint32_t expected = 0;
+        (sharp ? world.world.sharp_asked : world.world.soft_asked) = [&](TileId, int texel, std::uint32_t sample) {
+          expected += sample < 0x80000000u && is_bad(texel, sample) ? 1 : 0;
+        };
+        const TileId tile(0, static_cast<std::uint32_t>(next_++ % 9));
+        const auto surface = world.tile(tile);
+        std::uint32_t quarantined = 0;
+        const auto start = renderer::survey_tile(*store_, tile, TexelMask::all(), *surface).least;
+        for (const std::uint32_t passes : {1u, 4u})  // a first pass where the tile is new, then soft light for all
+          quarantined += renderer::shade_tile(*store_, tile, TexelMask::all(), passes, *surface).value().quarantined;
+        count.see(std::abs(static_cast<double>(quarantined) - expected), "value", value);
         const auto view = store_->read(tile);
         ASSERT_TRUE(view);
         for (int t = 0; t < kTileTexels; ++t) {
-          const float share = t % 7 == 0 ? 0.0f : 1.0f;  // a texel that always fails is black
-          const bool right = view->mean(Layer::kSharp, t) == glm::vec3(0.25f * share) &&
-                             view->mean(Layer::kSoft, t) == glm::vec3(0.5f * share) &&
-                             view->count(Layer::kSoft, t) == static_cast<float>(start + kPasses);
+          // A texel that always fails is black in the layer that fails. Tiles come more than once, with other faults.
+          const float share = t % 7 == 0 ? 0.0f : 1.0f;
+          const bool fresh = start == 0;
+          const glm::vec3 seen = sharp ? view->mean(Layer::kSharp, t) : view->mean(Layer::kSoft, t);
+          const glm::vec3 truth((sharp ? 0.25f : 0.5f) * share);
+          const bool right = (fresh ? seen == truth : share == 0 || seen == truth) && view->count(Layer::kSoft, t) >= 4;
           stored.see(right ? 0 : 1, "value", value, "texel", t);
         }
       }
 }
 
-// The picture's bound on lone bright texels: exactly 2 + n / 8 times the neighbours' mean, darkening only, nothing from
-// 256 samples on. The store has no part in it.
+// The picture's bound on lone bright texels: exactly 2 + 24 / n + n / 8 times the neighbours' mean, darkening only,
+// nothing from 256 samples on. The store has no part in it.
 TEST(Fireflies, are_held_to_the_stated_bound_and_to_nothing_else) {
   Worst over("fireflies: brightness over the stated bound, relative", 1e-5);
   Worst brighter("fireflies: texels made brighter, or dimmed without need", 0);
@@ -257,7 +261,7 @@ TEST(Fireflies, are_held_to_the_stated_bound_and_to_nothing_else) {
             ++n;
           }
         const auto at = static_cast<std::size_t>(y * size + x);
-        const double bound = (2 + double{samples} / 8) * sum / n;
+        const double bound = (2 + 24 / double{samples} + double{samples} / 8) * sum / n;
         const double was = before[at], is = window.grey[at];
         brighter.see(is > was || (is < was && (samples >= 256 || was < bound * (1 - 1e-5))) ? 1 : 0, "samples",
                      samples);

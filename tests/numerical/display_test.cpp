@@ -77,7 +77,9 @@ class Picture : public ::testing::Test {
   }
   renderer::TilePicture picture_of(TileId tile, float exposure) {
     const renderer::LevelTiles level{3, 3};
-    (void)renderer::shade_tile(*store_, tile, TexelMask::all(), 4, *world_.tile(tile)).value();
+    world_.world.albedo = [](TileId, int, int) { return glm::vec3(1.0f); };
+    for (const std::uint32_t passes : {1u, 4u})  // the first pass, then soft light for all
+      (void)renderer::shade_tile(*store_, tile, TexelMask::all(), passes, *world_.tile(tile)).value();
     renderer::TileFactsCache facts;
     facts.get(tile, level, world_, *store_)->learn_albedo(*world_.tile(tile), TexelMask::all());
     renderer::TileDisplay display(*store_, facts, {exposure, 384});

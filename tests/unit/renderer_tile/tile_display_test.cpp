@@ -26,8 +26,16 @@ class TileDisplayTest : public ::testing::Test {
     store_.reset();
     std::filesystem::remove_all(dir_);
   }
+  // A first pass where one is due, then `passes` of soft light for all.
   ShadingResult shade(TileId id, std::uint32_t passes, const TexelMask& mask = TexelMask::all()) {
+    if (survey_tile(*store_, id, mask, *world_.tile(id)).unshaded > 0) first_pass(id, mask);
     auto result = shade_tile(*store_, id, mask, passes, *world_.tile(id));
+    EXPECT_TRUE(result);
+    facts_.get(id, level_, world_, *store_)->learn_albedo(*world_.tile(id), mask);
+    return *result;
+  }
+  ShadingResult first_pass(TileId id, const TexelMask& mask = TexelMask::all()) {
+    auto result = shade_tile(*store_, id, mask, 1, *world_.tile(id));
     EXPECT_TRUE(result);
     facts_.get(id, level_, world_, *store_)->learn_albedo(*world_.tile(id), mask);
     return *result;
@@ -129,7 +137,7 @@ TEST_F(TileDisplayTest, texels_outside_the_mask_are_filled_from_their_own_patch)
   TexelMask mask;
   mask.set(2, 2);
   mask.set(27, 27);
-  EXPECT_EQ(shade(middle_, 1, mask).samples, 2u);
+  first_pass(middle_, mask);
   const auto picture = draw(middle_, 384, mask);
   EXPECT_EQ(code(picture, 14, 29), srgb_code(0.7f));
   EXPECT_EQ(code(picture, 15, 0), srgb_code(0.05f));
@@ -163,9 +171,8 @@ TEST_F(TileDisplayTest, light_that_is_no_number_never_reaches_the_picture) {
 
 TEST_F(TileDisplayTest, restart_continues_the_sequence) {
   std::vector<std::uint32_t> numbers;
-  world_.world.light = [&](TileId, int t, std::uint32_t s) {
+  world_.world.soft_asked = [&](TileId, int t, std::uint32_t s) {
     if (t == 7) numbers.push_back(s);
-    return TexelLight{{}, glm::vec3(0.3f)};
   };
   shade(middle_, 2);
   store_.reset();
@@ -181,11 +188,46 @@ TEST_F(TileDisplayTest, newly_seen_texels_catch_up_first) {
   shade(middle_, 8, some);
   TexelMask more = some;
   for (int x = 0; x < 10; ++x) more.set(x, 1);
+  EXPECT_EQ(first_pass(middle_, more).progress.unshaded, 0u);
   const auto result = shade(middle_, 4, more);
-  EXPECT_EQ(result.samples, 40u);
   EXPECT_EQ(result.progress.least, 4.0f);
   EXPECT_EQ(result.progress.mean, 6.0f);
   EXPECT_EQ(result.progress.texels, 20u);
+}
+
+TEST_F(TileDisplayTest, first_pass_takes_soft_light_for_one_texel_in_four_and_the_picture_has_it_everywhere) {
+  world_.world.light = [](TileId, int, std::uint32_t) { return TexelLight{glm::vec3(0.1f), glm::vec3(0.25f)}; };
+  int asked = 0;
+  world_.world.soft_asked = [&](TileId, int, std::uint32_t) { ++asked; };
+  const auto result = first_pass(middle_);
+  EXPECT_EQ(asked, 225);
+  EXPECT_EQ(result.progress.unshaded, 0u);
+  EXPECT_EQ(result.progress.mean, 0.25f);
+  const auto picture = draw(middle_);
+  for (int t = 0; t < kTileTexels; ++t) ASSERT_EQ(code(picture, t % 30, t / 30), srgb_code(0.35f)) << t;
+}
+
+TEST_F(TileDisplayTest, first_pass_leaves_no_patch_without_soft_light) {
+  // Columns of one texel: half of them have no texel that leads a 2x2 block.
+  world_.world.patch = [](TileId, int x, int) { return static_cast<std::uint32_t>(x); };
+  world_.world.light = [](TileId, int t, std::uint32_t) {
+    return TexelLight{{}, glm::vec3(static_cast<float>(t % 30 + 1) / 40)};
+  };
+  first_pass(middle_);
+  const auto picture = draw(middle_);
+  for (int x = 0; x < 30; ++x) EXPECT_EQ(code(picture, x, 9), srgb_code(static_cast<float>(x + 1) / 40)) << x;
+}
+
+TEST_F(TileDisplayTest, sharp_light_is_sampled_again_where_its_samples_differ) {
+  world_.world.light = [](TileId id, int t, std::uint32_t s) {
+    return TexelLight{glm::vec3(t % 30 < 15 ? 0.5f : (noise_of(id, t, s) < 0.5f ? 0.0f : 1.0f)), glm::vec3(0.1f)};
+  };
+  for (int i = 0; i < 5; ++i) shade(middle_, 8);
+  const auto light = store_->read(middle_);
+  ASSERT_TRUE(light);
+  EXPECT_EQ(light->count(atlas::Layer::kSoft, 0), 40.0f);
+  EXPECT_LE(light->count(atlas::Layer::kSharp, 0), 16.0f);
+  EXPECT_EQ(light->count(atlas::Layer::kSharp, 20), 80.0f);
 }
 
 TEST_F(TileDisplayTest, coverage_is_the_mean_alpha_with_border) {

@@ -151,7 +151,7 @@ TEST_F(TileScheduleTest, newly_seen_texels_are_shaded_and_shown_at_once) {
   schedule.shaded(jobs[0].tile, half, 0);
   jobs = schedule.next_batch(1000);
   ASSERT_EQ(jobs.size(), 1u);
-  EXPECT_EQ(jobs[0].cost, 10u);
+  EXPECT_EQ(jobs[0].cost, 12u);  // sharp light for ten, soft for a quarter of them
   schedule.shaded(jobs[0].tile, at(10, 20), 10);
   EXPECT_EQ(publish(), std::vector<std::uint32_t>{1});
 }
@@ -186,11 +186,29 @@ TEST(CoarseRoundsTest, rounds_end_and_pictures_come_at_powers_of_two) {
   std::vector<std::uint32_t> pictures;
   std::uint32_t round = 0;
   for (int i = 0; i < 1000 && !rounds.finished(); ++i) {
-    for (const auto& job : rounds.next_batch(1500)) round = std::max(round, job.cost == 225 ? 0u : job.most);
+    for (const auto& job : rounds.next_batch(1500)) round = std::max(round, job.most);
     if (rounds.batch_finished()) pictures.push_back(round);
   }
-  EXPECT_EQ(pictures, (std::vector<std::uint32_t>{0, 1, 2, 4, 8, 10}));
+  EXPECT_EQ(pictures, (std::vector<std::uint32_t>{1, 1, 2, 4, 8, 10}));  // the first is the first pass
   EXPECT_TRUE(rounds.finished());
+}
+
+TEST(CoarseRoundsTest, what_is_seen_comes_first_and_is_enough_for_a_picture) {
+  CoarseRounds rounds(1, LevelTiles{3, 3}, 10);
+  TexelMask left, right;
+  left.set(0, 0);
+  right.set(29, 29);
+  rounds.prefer(std::vector<CoarseRequest>{{7, left}, {99, left}, {2, left}, {7, right}});
+  const auto jobs = rounds.next_batch(1000);
+  ASSERT_EQ(jobs.size(), 2u);  // one a tile, none outside the level
+  EXPECT_EQ(jobs[0].tile.index(), 2u);
+  EXPECT_EQ(jobs[1].tile.index(), 7u);
+  EXPECT_EQ(jobs[1].mask.count(), 2);
+  EXPECT_TRUE(rounds.batch_finished());
+  EXPECT_FALSE(rounds.opening());
+  // The rest of round 0 has every tile whole, those too.
+  EXPECT_EQ(rounds.next_batch(1u << 20).size(), 9u);
+  EXPECT_TRUE(rounds.batch_finished());
 }
 
 TEST(CoarseCanvasTest, tiles_without_light_take_the_nearest_colour) {
@@ -227,7 +245,6 @@ TEST(CoarseRounds, resume_after_the_rounds_that_are_stored) {
   CoarseRounds rounds(1, {3, 3}, 64);
   rounds.resume(16);
   EXPECT_FALSE(rounds.opening());
-  EXPECT_TRUE(rounds.first_pass_done());
   const auto jobs = rounds.next_batch(1);
   ASSERT_FALSE(jobs.empty());
   EXPECT_EQ(jobs[0].most, 17u);

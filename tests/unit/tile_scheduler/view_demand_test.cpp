@@ -71,6 +71,23 @@ TEST_F(Demand, DoesNotShadeFallbackTexelsOfATileThatServesOnlyItsOwnLevel) {
   }
 }
 
+TEST_F(Demand, CoarseTexelsUnderTheViewAreAskedForUntilThereIsACoarsePicture) {
+  const auto d = demand(4096);
+  std::set<std::uint32_t> tiles;
+  for (const auto& request : d.coarse) {
+    EXPECT_TRUE(tiles.insert(request.tile).second) << "one request a tile";
+    EXPECT_FALSE(request.mask.empty());
+  }
+  // Every tile of the coarse level that some chain could be served by is among them.
+  const int coarse = world_.layout->coarse_level();
+  for (const auto& tile : set_.current().tiles())
+    if (tile.level() == coarse && !set_.current().find(tile)->fallback.empty())
+      EXPECT_TRUE(tiles.contains(tile.index())) << tile.index();
+  const CoarseLuma luma{2, 2, std::vector<std::uint8_t>(4)};
+  EXPECT_TRUE(
+      demand_of(set_, *world_.layout, PageTable(64), [this](TileId t) { return find(t); }, &luma, {}).coarse.empty());
+}
+
 TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
   auto d = demand(4096);
   EXPECT_TRUE(d.granted.tiles.empty());

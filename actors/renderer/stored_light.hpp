@@ -1,0 +1,51 @@
+// Light that is already known, for rays to end in: irradiance of the whole scene at the coarse level.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "actors/atlas/layout.hpp"
+#include "actors/atlas/radiance_store.hpp"
+#include "actors/renderer/filter_irradiance.hpp"
+#include "actors/renderer/trace/surface.hpp"
+
+namespace darm::renderer {
+
+/// One texel: irradiance / pi (nits) of its side of the surface, sharp and soft light together; w is 1 where that is
+/// known, else 0.
+using StoredTexel = glm::vec4;
+
+/// What a tile of the store holds, as StoredTexels; soft light as filtered in `filtered` (32x32, of a slot with its
+/// border) where that is known.
+[[nodiscard]] std::array<StoredTexel, kTileTexels> stored_texels(const atlas::TileView& tile,
+                                                                 std::span<const FilteredTexel> filtered);
+
+/// A snapshot: filled once (different tiles may come from different threads), then read by any thread.
+class StoredLight {
+ public:
+  explicit StoredLight(std::shared_ptr<const atlas::Layout> layout);
+
+  /// `texels`: the tile's kTileTexels payload texels, row by row. Values that are not finite and >= 0 become unknown.
+  void put(std::uint32_t tile_index, std::span<const StoredTexel> texels);
+
+  /// Irradiance / pi at a surface point on the side `s.front` says. `xi` in [0, 1)^2 picks one of the four texels
+  /// around it with its bilinear weight, so that the mean over xi is the bilinear value for the price of one. False:
+  /// not known (no texels on that side, not lit yet); `light` is then left alone.
+  [[nodiscard]] bool find(const trace::Surface& s, const glm::vec2& xi, glm::vec3& light) const;
+
+  /// A ray shorter than this ends too near its start for texels of the coarse level: corners and contacts would smear.
+  [[nodiscard]] float least_distance() const { return least_distance_; }
+
+ private:
+  std::shared_ptr<const atlas::Layout> layout_;
+  float least_distance_ = 0;
+  std::vector<StoredTexel> texels_;  // row-major over the coarse level
+};
+
+}  // namespace darm::renderer
