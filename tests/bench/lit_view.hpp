@@ -1,6 +1,9 @@
 // A still view of a scene and the pictures of its tiles, made in one process by the same functions as `darmd serve`.
 #pragma once
 
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <cstdint>
 #include <string>
 #include <unordered_map>
@@ -37,6 +40,7 @@ using TileMasks = std::unordered_map<TileId, TexelMask>;
 /// Loads scene, atlas and store (created in `state_dir` if it is not there); the working set is traced, nothing is lit.
 inline Result<void> open_view(LitView& view, const char* setup, const char* scene, const char* camera,
                               const char* state_dir, double q) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is the figures' alone
   auto loaded = config::load(std::vector<std::filesystem::path>{setup});
   if (!loaded) return fail(config::to_string(loaded.error()));
   view.config = std::move(*loaded);

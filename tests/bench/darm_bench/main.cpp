@@ -1,0 +1,47 @@
+// darm-bench NAME --scene F --json: figures of the whole system, each with its peer beside it.
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "tests/bench/darm_bench/time_to_quality.hpp"
+
+namespace {
+
+int print(const darm::Result<nlohmann::json>& report, bool json) {
+  if (!report) {
+    std::fprintf(stderr, "darm-bench: %s\n", report.error().message.c_str());
+    return 1;
+  }
+  std::printf("%s\n", report->dump(json ? -1 : 2).c_str());
+  return 0;
+}
+
+void declare_time_to_quality(CLI::App& app, darm::bench::TimeToQualityOptions& o) {
+  app.add_option("--scene", o.scene, "glTF file (default: the set-up's)");
+  app.add_option("--config", o.config, "set-up, e.g. config/scenes/sponza.toml");
+  app.add_option("--camera", o.cameras, "a camera as darmd takes it; more than one: a client each, all at once")
+      ->required()
+      ->expected(1, 64);
+  app.add_option("--state-dir", o.state_dir, "keeps layouts and references; its radiance stores are deleted")
+      ->default_val("bench-state");
+  app.add_option("--target", o.target_db, "dB")->capture_default_str();
+  app.add_option("--seconds", o.seconds, "how long the clients watch")->capture_default_str();
+  app.add_option("--q", o.q, "texels per world unit (default: the set-up's)");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is the figures' alone
+  CLI::App app("darm-bench: figures of the whole system, each with its peer beside it");
+  app.require_subcommand(1);
+  bool json = false;
+  darm::bench::TimeToQualityOptions quality;
+  auto* time = app.add_subcommand("time-to-quality", "seconds until a picture is good, beside tracing camera frames");
+  declare_time_to_quality(*time, quality);
+  time->add_flag("--json", json, "one line of JSON");
+  CLI11_PARSE(app, argc, argv);
+  return print(darm::bench::time_to_quality(quality), json);
+}
