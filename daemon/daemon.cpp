@@ -45,6 +45,7 @@ tile_scheduler::SchedulerOptions scheduler_options(const config::Config& config)
 renderer::RendererOptions renderer_options(const config::Config& config, float exposure) {
   renderer::RendererOptions options;
   options.display.exposure = exposure;
+  options.display.filter_samples = static_cast<float>(config.accuracy.filter_samples);
   options.schedule.max_samples = config.render.max_samples;
   options.schedule.target_error = static_cast<float>(config.accuracy.target);
   options.slice_ms = static_cast<float>(config.render.slice_ms);
@@ -167,7 +168,7 @@ void Daemon::Parts::spawn_actors() {
   parts.surfaces = renderer::make_scene_surfaces(world.scene, world.mapper, world.transport, seed);
   parts.store = world.store;
   parts.levels = renderer::level_tiles_of(*world.layout);
-  parts.layout = world.layout;
+  if (config.accuracy.indirect == "stored") parts.layout = world.layout;
   parts.options = renderer_options(config, world.exposure);
   parts.scheduler = scheduler;
   parts.metrics = &metrics;

@@ -64,10 +64,23 @@ struct RenderConfig {
   double slice_ms = 4;                ///< length of one slice of pool work
 };
 
-/// [accuracy]
+/// [accuracy]: a preset, and the knobs it stands for. A knob that is given as well has the last word.
 struct AccuracyConfig {
-  double target = 0.002;  ///< RMS display error (0..1) of a tile under which it costs no more time
+  std::string preset = "balanced";     ///< preview, balanced or reference: see preset_of()
+  double target = 0.002;               ///< RMS display error (0..1) of a tile under which it costs no more time
+  std::string indirect = "stored";     ///< where paths end: "stored" in light that is known, or "traced" to their end
+  std::uint32_t filter_samples = 384;  ///< samples that soft light is averaged over while it has fewer; 0: not at all
 };
+
+/// The knobs of a preset by its name; `balanced` for a name that is none.
+///   preview    target 0.01,   indirect stored, filter 384: noise of two and a half steps of an 8-bit display is left
+///   balanced   target 0.002,  indirect stored, filter 384: half a step of an 8-bit display
+///   reference  target 0.0005, indirect traced, no filter: unbiased, for measuring
+[[nodiscard]] inline AccuracyConfig preset_of(const std::string& name) {
+  if (name == "preview") return {name, 0.01, "stored", 384};
+  if (name == "reference") return {name, 0.0005, "traced", 0};
+  return {};
+}
 
 /// [stream]
 struct StreamConfig {

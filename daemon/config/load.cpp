@@ -99,7 +99,15 @@ void read_work(TableReader& root, Config& config) {
     reader.integer("max_samples", config.render.max_samples, 1, 1 << 24);
     reader.number("slice_ms", config.render.slice_ms, 0.1, 100);
   });
-  root.table("accuracy", [&](TableReader& reader) { reader.number("target", config.accuracy.target, 0.0001, 1); });
+  root.table("accuracy", [&](TableReader& reader) {
+    auto& accuracy = config.accuracy;
+    std::string preset = accuracy.preset;
+    reader.choice("preset", preset, {"preview", "balanced", "reference"});
+    if (preset != accuracy.preset) accuracy = preset_of(preset);
+    reader.number("target", accuracy.target, 0.0001, 1);
+    reader.choice("indirect", accuracy.indirect, {"stored", "traced"});
+    reader.integer("filter_samples", accuracy.filter_samples, 0, 4096);
+  });
   root.table("stream", [&](TableReader& reader) {
     reader.number("updates_per_second", config.stream.updates_per_second, 0.1, 120);
     reader.one_of("phystex", config.stream.phystex, {1024, 2048, 4096});

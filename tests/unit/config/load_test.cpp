@@ -55,7 +55,10 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.render.threads, b.render.threads);
   EXPECT_EQ(a.render.max_samples, b.render.max_samples);
   EXPECT_EQ(a.render.slice_ms, b.render.slice_ms);
+  EXPECT_EQ(a.accuracy.preset, b.accuracy.preset);
   EXPECT_EQ(a.accuracy.target, b.accuracy.target);
+  EXPECT_EQ(a.accuracy.indirect, b.accuracy.indirect);
+  EXPECT_EQ(a.accuracy.filter_samples, b.accuracy.filter_samples);
   EXPECT_EQ(a.stream.updates_per_second, b.stream.updates_per_second);
   EXPECT_EQ(a.stream.phystex, b.stream.phystex);
   EXPECT_EQ(a.stream.max_writes, b.stream.max_writes);
@@ -205,6 +208,19 @@ TEST(LoadConfig, LaterFilesOverrideKeysAndReplaceLists) {
   ASSERT_EQ(loaded->cameras.size(), 1u);
   EXPECT_EQ(loaded->cameras[0].name, "c");
   std::filesystem::remove_all(dir);
+}
+
+TEST(LoadConfig, APresetSetsItsKnobsAndAKnobHasTheLastWord) {
+  const auto preview = parse("[accuracy]\npreset = \"preview\"\n", "a.toml");
+  ASSERT_TRUE(preview);
+  EXPECT_EQ(preview->accuracy.target, 0.01);
+  EXPECT_EQ(preview->accuracy.indirect, "stored");
+  const auto reference = parse("[accuracy]\nfilter_samples = 12\npreset = \"reference\"\n", "a.toml");
+  ASSERT_TRUE(reference);
+  EXPECT_EQ(reference->accuracy.target, 0.0005);
+  EXPECT_EQ(reference->accuracy.indirect, "traced");
+  EXPECT_EQ(reference->accuracy.filter_samples, 12u) << "whichever comes first in the file";
+  EXPECT_FALSE(parse("[accuracy]\npreset = \"best\"\n", "a.toml"));
 }
 
 TEST(LoadConfig, MissingAndOversizedFilesAreFaults) {
