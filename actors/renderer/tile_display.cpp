@@ -14,6 +14,8 @@ using atlas::Plane;
 
 namespace {
 
+constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
+
 float grey_of(const glm::vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
@@ -103,10 +105,10 @@ void TileDisplay::shade_slot(std::vector<float>& variance, SlotColours& colours)
         soft_variance = f.variance;
       }
       const glm::vec3 albedo = from.facts->albedo(texel);
-      // One shadow ray a sample: a lone sample is mostly right, so its unknown spread is taken as half its value.
+      // One shadow ray a sample: a lone sample is mostly right, its spread is about a third of its value (measured).
       variance[at] =
           grey_of(albedo) * grey_of(albedo) *
-          (soft_variance + from.light->variance_of_mean(Layer::kSharp, texel, 0.25f * grey_sharp * grey_sharp));
+          (soft_variance + from.light->variance_of_mean(Layer::kSharp, texel, kLoneSample * grey_sharp * grey_sharp));
       const glm::vec3 all = ((sharp + soft) * albedo + from.facts->emission(texel)) * options_.exposure;
       colours.fill.set(static_cast<int>(at), {all.x, all.y, all.z});
     }

@@ -249,7 +249,7 @@ void TileSchedulerActor::compose(Session& session) {
   const bool first = session.stream.last_frame() == 0;
   const bool nothing_yet = session.demand.granted.tiles.empty() && !session.demand.target.tiles.empty();
   if (first && nothing_yet && started - session.asked_at < options_.first_frame_wait) return;
-  const float error = view_error(session.demand, images(), options_.coarse_error);
+  const float error = view_error(session.demand, images(), layout_->coarse_level(), coarse_ != nullptr);
   auto step = session.stream.step(session.demand.granted.tiles, images(), error, started);
   for (const auto& answer : step.no_change)
     peers_->sessions->find(answer.session).tell(session::NoChange(answer, error));

@@ -28,7 +28,6 @@ struct SchedulerOptions {
   int passes_unlit = 4;                  ///< passes after these come
   int updates_unlit = 4;                 ///< in one of so many updates: the same cores make the pictures
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
-  float coarse_error = 0.25f;            ///< display error assumed of what CoarseTex serves
   /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.
   Microseconds reweigh_interval = 1'000'000;
   /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.

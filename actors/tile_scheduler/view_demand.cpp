@@ -155,19 +155,27 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
   demand.granted = allocate_slots(request, options);
 }
 
-float view_error(const ViewDemand& demand, const ImageLookup& images, float coarse_error) {
+float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse_level, bool has_coarse,
+                 const ErrorOptions& options) {
+  const auto too_coarse = [&](int levels) {
+    return double(options.coarser[static_cast<std::size_t>(std::clamp(levels, 0, 4))]);
+  };
   double sum = 0;
   double weight = 0;
   for (std::size_t c = 0; c < demand.chains.size(); ++c) {
     const auto& [chain, share] = demand.chains[c];
     const auto position = demand.granted.served[c];
-    double error = double(coarse_error);
-    if (position < kChainLength)
-      if (const auto* stored = images(chain.tiles[position])) error = double(stored->error);
-    sum += double(share) * error * error;
+    double squared = double(options.unlit) * double(options.unlit);
+    if (position < kChainLength) {
+      if (const auto* stored = images(chain.tiles[position]))
+        squared = double(stored->error) * double(stored->error) + too_coarse(position) * too_coarse(position);
+    } else if (has_coarse) {
+      squared = too_coarse(coarse_level - chain.sharp_level()) * too_coarse(coarse_level - chain.sharp_level());
+    }
+    sum += double(share) * squared;
     weight += double(share);
   }
-  return weight > 0 ? static_cast<float>(std::sqrt(sum / weight)) : coarse_error;
+  return weight > 0 ? static_cast<float>(std::sqrt(sum / weight)) : options.unlit;
 }
 
 std::vector<TileRequest> join_requests(const std::vector<const std::vector<TileRequest>*>& views) {

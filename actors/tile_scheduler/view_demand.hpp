@@ -1,6 +1,7 @@
 // From a working set to decisions: which tiles a view should have, which it can have now, what must be shaded. Pure.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -40,9 +41,17 @@ struct ViewDemand {
 void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
                      const AllocationOptions& options);
 
-/// Estimated display error of the view: RMS over its samples of the error of the tile that serves each. Samples that
-/// CoarseTex serves count with `coarse_error`. 0..1; `coarse_error` without samples.
-[[nodiscard]] float view_error(const ViewDemand& demand, const ImageLookup& images, float coarse_error);
+struct ErrorOptions {
+  /// RMS display error of a sample drawn 0, 1, ... levels coarser than sharp, beside noise (measured in the nine
+  /// evaluation views at q = 64; the last for all further ones).
+  std::array<float, 5> coarser{0.0f, 0.016f, 0.025f, 0.033f, 0.045f};
+  float unlit = 0.25f;  ///< of a sample that nothing serves yet
+};
+
+/// Estimated display error of the light a view has: RMS over its samples of the error of the tile that serves each and
+/// of how much coarser than sharp it is. `has_coarse`: CoarseTex serves what no tile does. 0..1.
+[[nodiscard]] float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse_level, bool has_coarse,
+                               const ErrorOptions& options = {});
 
 /// The requests of all views as one working set: weights add, masks join, displayed if any view displays it.
 [[nodiscard]] std::vector<renderer::TileRequest> join_requests(

@@ -24,6 +24,8 @@ void declare_time_to_quality(CLI::App& app, darm::bench::TimeToQualityOptions& o
   app.add_option("--camera", o.cameras, "a camera as darmd takes it; more than one: a client each, all at once")
       ->required()
       ->expected(1, 64);
+  app.add_option("--reference", o.references,
+                 "BASE of BASE.a.pfm and BASE.b.pfm, one a camera (default: rendered once)");
   app.add_option("--state-dir", o.state_dir, "keeps layouts and references; its radiance stores are deleted")
       ->default_val("bench-state");
   app.add_option("--target", o.target_db, "dB")->capture_default_str();

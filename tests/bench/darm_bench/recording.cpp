@@ -1,5 +1,7 @@
 #include "tests/bench/darm_bench/recording.hpp"
 
+#include <cmath>
+
 #include "client/core/renderer_gles.hpp"
 #include "client/core/stream_player.hpp"
 
@@ -77,7 +79,19 @@ class Player {
     if (!picture) return std::unexpected(picture.error());
     const auto score = compare(*picture, reference);
     if (!score) return std::unexpected(score.error());
+    pictures_.push_back(std::move(picture->rgb));
     return SeriesPoint{t, score->psnr, framed_ ? estimate_ : 1.0};
+  }
+
+  void compare_to_last(std::vector<SeriesPoint>& series) const {
+    for (std::size_t i = 0; i < series.size() && i < pictures_.size(); ++i) {
+      double sum = 0;
+      for (std::size_t k = 0; k < pictures_[i].size(); ++k) {
+        const double d = (double(pictures_[i][k]) - double(pictures_.back()[k])) / 255.0;
+        sum += d * d;
+      }
+      series[i].to_last = std::sqrt(sum / static_cast<double>(pictures_[i].size()));
+    }
   }
 
  private:
@@ -91,6 +105,7 @@ class Player {
   std::optional<SceneModel> scene_;
   std::optional<StreamPlayer> player_;
   std::unique_ptr<GlesRenderer> renderer_;
+  std::vector<std::vector<std::uint8_t>> pictures_;  // one a point
   double estimate_ = 1;
   bool framed_ = false;
 };
@@ -118,6 +133,7 @@ Result<std::vector<SeriesPoint>> replay(const Recording& recording, const Refere
     drawn_at = t;
     stale = false;
   }
+  player.compare_to_last(series);
   return series;
 }
 

@@ -26,6 +26,7 @@ struct SeriesPoint {
   double t = 0;
   double psnr = 0;
   double estimate = 0;  ///< the server's error estimate at that time, display RMS
+  double to_last = 0;   ///< display RMS to the last picture of the recording: what light (and codec) still changed
 };
 
 /// Applies the recording message by message in the current GL context and draws where a frame or CoarseTex changed the

@@ -27,6 +27,13 @@ client::View to_view(const Camera& camera, const TimeToQualityOptions& options) 
   return view;
 }
 
+Result<client::Reference> read_reference(const std::string& base) {
+  auto a = client::read_pfm(base + ".a.pfm");
+  auto b = client::read_pfm(base + ".b.pfm");
+  if (!a || !b) return fail(base + ": its halves cannot be read: " + (a ? b : a).error().message);
+  return client::Reference{std::move(*a), std::move(*b)};
+}
+
 Result<client::Reference> reference_of(const renderer::LightTransport& transport, renderer::ReferenceJob job,
                                        const fs::path& file) {
   job.state_file = file;
@@ -64,7 +71,8 @@ Result<std::vector<Recording>> record_all(const config::Config& config, const st
 
 nlohmann::json to_json(const std::vector<SeriesPoint>& series) {
   auto out = nlohmann::json::array();
-  for (const auto& p : series) out.push_back({{"t", p.t}, {"psnr", p.psnr}, {"estimate", p.estimate}});
+  for (const auto& p : series)
+    out.push_back({{"t", p.t}, {"psnr", p.psnr}, {"estimate", p.estimate}, {"to_last", p.to_last}});
   return out;
 }
 
@@ -121,7 +129,9 @@ Result<nlohmann::json> time_to_quality(const TimeToQualityOptions& options) {
     std::snprintf(name, sizeof name, "bench-%016llx-%016zx-%ux%u.bin",
                   static_cast<unsigned long long>(world->scene->hash), std::hash<std::string>{}(spec), options.width,
                   options.height);
-    auto reference = reference_of(*world->transport, job, options.state_dir / name);
+    auto reference = views.size() <= options.references.size()
+                         ? read_reference(options.references[views.size() - 1])
+                         : reference_of(*world->transport, job, options.state_dir / name);
     if (!reference) return std::unexpected(reference.error());
     references.push_back(std::move(*reference));
     job.seed_a = 101;

@@ -13,8 +13,9 @@ namespace darm::bench {
 struct TimeToQualityOptions {
   std::filesystem::path config;  ///< set-up; may be empty
   std::filesystem::path scene;
-  std::vector<std::string> cameras;  ///< one client each, all at once
-  std::filesystem::path state_dir;   ///< keeps layouts and references between runs; the radiance store is always empty
+  std::vector<std::string> cameras;     ///< one client each, all at once
+  std::vector<std::string> references;  ///< per camera: BASE of BASE.a.pfm and BASE.b.pfm; missing: rendered, kept
+  std::filesystem::path state_dir;  ///< keeps layouts and references between runs; the radiance store is always empty
   double target_db = 30;
   double seconds = 20;
   double q = 0;  ///< 0: the set-up's

@@ -91,19 +91,23 @@ TEST_F(Demand, CoarseTexelsUnderTheViewAreAskedForUntilThereIsACoarsePicture) {
 TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
   auto d = demand(4096);
   EXPECT_TRUE(d.granted.tiles.empty());
-  EXPECT_FLOAT_EQ(view_error(d, [this](TileId t) { return find(t); }, 0.25f), 0.25f);
+  const auto error = [&](bool has_coarse) {
+    return view_error(d, [this](TileId t) { return find(t); }, world_.layout->coarse_level(), has_coarse);
+  };
+  EXPECT_FLOAT_EQ(error(false), ErrorOptions{}.unlit);
+  EXPECT_LE(error(true), ErrorOptions{}.coarser.back());
   for (std::size_t i = 0; i < d.target.tiles.size(); i += 2) shade(d.target.tiles[i], 0.1f);
   const auto lookup = [this](TileId t) { return find(t); };
   grant_available(d, world_.layout->coarse_level(), PageTable(4096), lookup, {});
   EXPECT_FALSE(d.granted.tiles.empty());
   for (const auto tile : d.granted.tiles) EXPECT_NE(find(tile), nullptr);
-  const float half = view_error(d, lookup, 0.25f);
-  EXPECT_GT(half, 0.1f);
-  EXPECT_LT(half, 0.25f);
+  EXPECT_GT(error(false), 0.1f);
+  EXPECT_LT(error(false), ErrorOptions{}.unlit);
+  EXPECT_LT(error(true), error(false));
   for (const auto tile : d.target.tiles) shade(tile, 0.1f);
   grant_available(d, world_.layout->coarse_level(), PageTable(4096), lookup, {});
   EXPECT_EQ(d.granted.tiles, d.target.tiles);
-  EXPECT_NEAR(view_error(d, lookup, 0.25f), 0.1f, 1e-5);
+  EXPECT_NEAR(error(true), 0.1f, 1e-5);
 }
 
 TEST(JoinRequests, AddsWeightsAndJoinsMasks) {
