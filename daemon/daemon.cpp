@@ -12,6 +12,8 @@
 #include "actors/encoder/encoder_actor.hpp"
 #include "actors/renderer/renderer_actor.hpp"
 #include "actors/renderer/tile_surface_scene.hpp"
+#include "actors/renderer/view_renderer_actor.hpp"
+#include "actors/renderer/view_surface_scene.hpp"
 #include "actors/runtime/registry.hpp"
 #include "actors/runtime/threaded_system.hpp"
 #include "actors/session/session_actor.hpp"
@@ -52,13 +54,23 @@ renderer::RendererOptions renderer_options(const config::Config& config, float e
   return options;
 }
 
-session::SessionPolicy session_policy(const config::Config& config, const scene::Scene& scene) {
+renderer::ViewRendererOptions view_options(const config::Config& config, float exposure) {
+  renderer::ViewRendererOptions options;
+  options.tile.exposure = exposure;
+  options.tile.max_samples = static_cast<float>(config.render.max_samples);
+  options.tile.target_error = static_cast<float>(config.accuracy.target);
+  options.slice_ms = static_cast<float>(config.render.slice_ms);
+  return options;
+}
+
+session::SessionPolicy session_policy(const config::Config& config, const World& world) {
   session::SessionPolicy policy;
+  policy.view_phystex = world.view_materials ? config.stream.view_phystex : 0;
   policy.phystex_size = config.stream.phystex;
   policy.allow_chroma_444 = config.stream.chroma_444;
   policy.allow_lossless = config.stream.allow_lossless;
   policy.updates_per_second = static_cast<float>(config.stream.updates_per_second);
-  policy.start = start_camera(config, scene);
+  policy.start = start_camera(config, *world.scene);
   policy.handshake_timeout = static_cast<Microseconds>(config.session.handshake_timeout_s * 1e6);
   policy.idle_timeout = static_cast<Microseconds>(config.session.idle_timeout_s * 1e6);
   policy.send.media_bytes = config.session.send_queue_bytes;
@@ -81,6 +93,7 @@ encoder::EncoderOptions encoder_options(const config::Config& config, StreamId s
                                         const tile_scheduler::StreamFormat& format) {
   encoder::EncoderOptions options;
   options.stream = stream;
+  options.layer = format.layer;
   options.phystex_size = format.phystex_size;
   options.chroma_444 = format.chroma_444;
   options.lossless_rgb = format.lossless_rgb;
@@ -113,7 +126,9 @@ struct Daemon::Parts {
 
   void fill_supervision(const std::function<void(const std::string&)>& on_fatal);
   void spawn_actors();
-  [[nodiscard]] tile_scheduler::Peers make_peers(std::shared_ptr<LateRef<renderer::Inbox>> renderer);
+  [[nodiscard]] tile_scheduler::Peers make_peers(std::shared_ptr<LateRef<renderer::Inbox>> renderer,
+                                                 std::shared_ptr<LateRef<renderer::ViewInbox>> view_renderer);
+  void spawn_view_renderer(LateRef<renderer::ViewInbox>& ref);
   [[nodiscard]] Result<Addresses> listen();
 };
 
@@ -135,13 +150,16 @@ void Daemon::Parts::fill_supervision(const std::function<void(const std::string&
   table.set("encoder", {FailureAction::kStopActor, log});  // the scheduler makes another: key frame
   table.set("coarse_encoder", {FailureAction::kEscalate, log});
   table.set("renderer", {FailureAction::kEscalate, log});  // slices fail inside it: retry, then quarantine
+  table.set("view_renderer", {FailureAction::kEscalate, log});
   table.set("tile_scheduler", {FailureAction::kEscalate, log});
   table.set("pool", {FailureAction::kStopActor, log});
   table.on_escalate([on_fatal](const Failure& failure) { on_fatal(failure.actor + ": " + failure.what); });
 }
 
-tile_scheduler::Peers Daemon::Parts::make_peers(std::shared_ptr<LateRef<renderer::Inbox>> renderer) {
+tile_scheduler::Peers Daemon::Parts::make_peers(std::shared_ptr<LateRef<renderer::Inbox>> renderer,
+                                                std::shared_ptr<LateRef<renderer::ViewInbox>> view_renderer) {
   tile_scheduler::Peers peers;
+  if (world.view_materials) peers.view_renderer = [view_renderer] { return view_renderer->get(); };
   peers.renderer = [renderer] { return renderer->get(); };
   peers.make_encoder = [this](StreamId stream, const tile_scheduler::StreamFormat& format) {
     auto receivers = [streams = streams, stream] { return streams->receivers(stream); };
@@ -157,13 +175,27 @@ tile_scheduler::Peers Daemon::Parts::make_peers(std::shared_ptr<LateRef<renderer
   return peers;
 }
 
+// Only where the scene calls for it: else there is no such actor.
+void Daemon::Parts::spawn_view_renderer(LateRef<renderer::ViewInbox>& ref) {
+  if (!world.view_materials) return;
+  renderer::ViewRendererParts parts;
+  parts.surfaces = renderer::make_view_surfaces(world.scene, world.mapper, world.transport, seed);
+  parts.options = view_options(config, world.exposure);
+  parts.scheduler = scheduler;
+  parts.metrics = &metrics;
+  ref.set(system->spawn<renderer::ViewRendererActor>("view_renderer", 1024, std::move(parts)));
+}
+
 void Daemon::Parts::spawn_actors() {
   coarse = system->spawn<encoder::CoarseEncoderActor>("coarse_encoder", 64, sessions, encoder::CoarseStillOptions{},
                                                       metrics);
   auto renderer_ref = std::make_shared<LateRef<renderer::Inbox>>();
-  auto peers = std::make_shared<tile_scheduler::Peers>(make_peers(renderer_ref));
+  auto view_ref = std::make_shared<LateRef<renderer::ViewInbox>>();
+  auto peers = std::make_shared<tile_scheduler::Peers>(make_peers(renderer_ref, view_ref));
   scheduler = system->spawn<tile_scheduler::TileSchedulerActor>("tile_scheduler", kMailbox, world.layout, world.rays,
-                                                                peers, scheduler_options(config), metrics);
+                                                                peers, scheduler_options(config), metrics,
+                                                                world.view_materials);
+  spawn_view_renderer(*view_ref);
   renderer::RendererParts parts;
   parts.surfaces = renderer::make_scene_surfaces(world.scene, world.mapper, world.transport, seed);
   parts.store = world.store;
@@ -188,7 +220,7 @@ Result<Addresses> Daemon::Parts::listen() {
   Addresses addresses;
   addresses.metrics_url = metrics.url();
   surroundings = std::make_shared<session::SessionSurroundings>();
-  surroundings->policy = session_policy(config, *world.scene);
+  surroundings->policy = session_policy(config, world);
   surroundings->scene = world.geometry;
   surroundings->scheduler = scheduler;
   surroundings->coarse = coarse;

@@ -83,6 +83,10 @@ Result<World> build_world(const config::Config& config, unsigned threads) {
                                              : renderer::scene_exposure(*world.transport);
   world.mapper = std::make_shared<atlas::TexelMapper>(world.scene, world.layout);
 
+  auto view = std::make_shared<const std::vector<scene::ViewMaterial>>(scene::view_materials(*world.scene));
+  if (scene::calls_for_view_layer(*view)) world.view_materials = std::move(view);
+  spdlog::info("private layer: {}", world.view_materials ? "for sessions that can take one" : "nothing calls for it");
+
   start = Clock::now();
   auto geometry = session::GeometryStream::build(*world.scene, *world.layout, world.exposure, threads);
   if (!geometry) return std::unexpected(geometry.error());

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "actors/atlas/layout.hpp"
 #include "actors/atlas/radiance_store.hpp"
@@ -10,6 +11,7 @@
 #include "actors/renderer/light_transport.hpp"
 #include "actors/renderer/trace/ray_scene.hpp"
 #include "actors/scene/scene.hpp"
+#include "actors/scene/view_materials.hpp"
 #include "actors/session/geometry_stream.hpp"
 #include "daemon/config/config.hpp"
 
@@ -23,6 +25,8 @@ struct World {
   std::shared_ptr<const atlas::TexelMapper> mapper;
   std::shared_ptr<atlas::RadianceStore> store;
   std::shared_ptr<const session::GeometryStream> geometry;
+  /// By instance: what of its light depends on the eye. Null: nothing calls for a private layer.
+  std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials;
   float exposure = 1;
 };
 

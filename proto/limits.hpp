@@ -32,6 +32,11 @@ inline constexpr std::uint32_t kMaxInstances = 4u * 1024 * 1024;
 inline constexpr std::uint32_t kMaxChunkVertices = 256 * 1024;
 inline constexpr std::uint32_t kMaxChunkIndices = 3 * 64 * 1024;
 
+/// Private PhysTex: sizes a session may have, pixels a side. Lossless (evaluation) ones may be larger.
+inline constexpr std::uint32_t kSmallestViewPhysTex = 512;
+inline constexpr std::uint32_t kLargestViewPhysTex = 1024;
+inline constexpr std::uint32_t kLargestLosslessViewPhysTex = 2048;
+
 /// Bytes of a vertex of GeometryChunk.vertices and of an entry of SceneManifest.patch_table.
 inline constexpr std::size_t kVertexBytes = 24;
 inline constexpr std::size_t kPatchEntryBytes = 12;

@@ -140,6 +140,7 @@ void EncoderActor::on(PictureEncoded&& event) {
 
 void EncoderActor::publish(Job& job) {
   job.frame->stream = options_.stream;
+  job.frame->layer = options_.layer;
   const std::shared_ptr<const session::EncodedFrame> frame = job.frame;
   for (const auto& [id, ref] : receivers_()) {
     ViewAnswer answer;
@@ -153,7 +154,7 @@ void EncoderActor::publish(Job& job) {
     if (!ref.tell(session::FrameEncoded(frame, answer))) {
       // A session that is too busy to take the frame has lost it; later ones would build on what it lacks.
       metrics_.count("darm_encoder_frames_refused_total");
-      scheduler_.tell(tile_scheduler::KeyFrameWanted(id));
+      scheduler_.tell(tile_scheduler::KeyFrameWanted(id, options_.layer));
     }
   }
 }
@@ -161,6 +162,12 @@ void EncoderActor::publish(Job& job) {
 void EncoderActor::record(const Job& job) {
   if (!job.error.empty()) {
     metrics_.count("darm_encoder_failures_total");
+    return;
+  }
+  if (options_.layer == StreamLayer::kView) {
+    metrics_.observe("darm_view_encode_seconds", seconds(job.started, job.encoded));
+    metrics_.count("darm_view_frames_total");
+    metrics_.count("darm_view_bytes_total", static_cast<double>(job.frame->h264.size()));
     return;
   }
   metrics_.observe("darm_encoder_compose_seconds", seconds(job.started, job.composed));

@@ -19,6 +19,7 @@ namespace darm::encoder {
 
 struct EncoderOptions {
   StreamId stream{};
+  StreamLayer layer = StreamLayer::kShared;
   std::uint32_t phystex_size = 2048;  ///< pixels per side, a multiple of 32; up to 8192 with a codec
   bool chroma_444 = false;
   bool lossless_rgb = false;  ///< no codec: tiles go out as they are

@@ -25,6 +25,7 @@ struct PageEdit {
   TileId tile;
   SlotIndex slot = kNoSlot;
   std::shared_ptr<const CoverageTile> coverage;  ///< only with a slot, and only the first time; null: opaque
+  std::shared_ptr<const ThroughTile> through;    ///< likewise; null: nothing in the tile is clear
 };
 
 /// Make one frame. At most one per stream is under way: the scheduler waits for FrameDone.

@@ -24,7 +24,7 @@ float smith_lambda(float cosine, float alpha) {
 
 }  // namespace
 
-Bsdf::Bsdf(const trace::Surface& surface, const MaterialPoint& material, const glm::vec3& wo)
+Bsdf::Bsdf(const trace::Surface& surface, const MaterialPoint& material, const glm::vec3& wo, Lobes lobes)
     : material_(material), normal_(surface.normal), geometric_(surface.geometric_normal) {
   // A bent normal that faces away from the eye has no microfacets to see: the flat one stands in.
   axis_[2] = glm::dot(normal_, wo) > 1e-3f ? normal_ : geometric_;
@@ -38,7 +38,7 @@ Bsdf::Bsdf(const trace::Surface& surface, const MaterialPoint& material, const g
   const float base = luminance(material.base);
   const float dielectric = (1.0f - material.metallic) * (1.0f - f);
   const float specular = luminance(reflectance(wo_.z));
-  const float diffuse = dielectric * (1.0f - material.transmission) * base;
+  const float diffuse = lobes == Lobes::kAll ? dielectric * (1.0f - material.transmission) * base : 0.0f;
   const bool lobe = material.transmission > 0 && !material.passes_straight();
   // Inside a body the whole surface may reflect totally where its tilted microfacets do not: what they let through
   // needs a chance that grows with their spread.

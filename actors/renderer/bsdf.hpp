@@ -1,6 +1,7 @@
 // Scattering at a surface point: glTF 2.0 appendix B with transmission, volume and ior.
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
 
 #include "actors/renderer/material_point.hpp"
@@ -16,6 +17,9 @@ struct BsdfSample {
   float pdf = 0;
 };
 
+/// Which lobes a Bsdf has: all, or all but the diffuse one.
+enum class Lobes : std::uint8_t { kAll, kSpecular };
+
 /// Lobes: Lambert, weighted by 1 - F(n.v), under a Schlick-weighted GGX coat (VNDF sampled, height-correlated Smith),
 /// metal GGX, and transmission: thin walls scatter to the mirrored side, volumes refract (Walter et al., Microfacet
 /// Models for Refraction, 2007). Straight passage (MaterialPoint::straight_through) is not a lobe: the path walks
@@ -23,7 +27,7 @@ struct BsdfSample {
 class Bsdf {
  public:
   /// `wo`: towards where the path came from, on the side of surface.geometric_normal.
-  Bsdf(const trace::Surface& surface, const MaterialPoint& material, const glm::vec3& wo);
+  Bsdf(const trace::Surface& surface, const MaterialPoint& material, const glm::vec3& wo, Lobes lobes = Lobes::kAll);
 
   /// f(wo, wi) |cos wi| and the density with which sample() gives wi.
   [[nodiscard]] glm::vec3 evaluate(const glm::vec3& wi, float& pdf) const;

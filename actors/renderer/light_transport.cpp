@@ -350,6 +350,46 @@ glm::vec3 LightTransport::transparency(const SurfacePoint& point) const {
   return make_material_point(*scene_, trace::make_surface(*rays_, point)).view_independent_transparency();
 }
 
+ViewDependentLight LightTransport::view_dependent(const SurfacePoint& point, const glm::vec3& eye,
+                                                  Sampler& sampler) const {
+  const auto s = trace::make_surface(*rays_, point);
+  ViewDependentLight made;
+  glm::vec3 wo = eye - s.position;
+  made.distance = glm::length(wo);
+  if (!(made.distance > 1e-12f) || sees_black(s)) return made;
+  wo *= 1.0f / made.distance;
+  const float cosine = glm::dot(wo, s.geometric_normal);
+  if (cosine < 0) wo -= s.geometric_normal * (2.0f * cosine);
+  const auto m = make_material_point(*scene_, s);
+  made.ggx_alpha = m.ggx_alpha;
+  if (m.unlit) return made;
+  if (m.interface) made.diffuse_factor = diffuse_view_factor(std::max(glm::dot(wo, s.normal), 0.0f));
+  if (!m.thin && m.passes_straight()) {
+    const glm::vec3 light = full_radiance({trace::spawn_origin(s, wo), 0.0f, -wo, 1e30f}, sampler);
+    made.radiance = finite_or_black(light - m.emission);
+    return made;
+  }
+  const BsdfScatter scatter(s, m, wo, Lobes::kSpecular);
+  glm::vec3 light = suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, 1) +
+                    emitters_at(s, scatter, sampler);
+  if (const BsdfSample next = scatter.sample(sampler); next.pdf > 0) {
+    Path path;
+    path.throughput = next.weight;
+    path.ray = {trace::spawn_origin(s, next.direction), 0.0f, next.direction, 1e30f};
+    path.from = s.position;
+    path.pdf = next.pdf;
+    path.bounce = 1;
+    light += trace_path(path, sampler);
+  }
+  made.radiance = finite_or_black(light);
+  return made;
+}
+
+glm::vec3 LightTransport::clear_tint(const SurfacePoint& point) const {
+  const auto m = make_material_point(*scene_, trace::make_surface(*rays_, point));
+  return m.thin && m.passes_straight() ? m.base * (m.alpha * (1.0f - m.metallic) * m.transmission) : glm::vec3(0.0f);
+}
+
 glm::vec3 LightTransport::full_radiance(const trace::Ray& ray, Sampler& sampler) const {
   Path path;
   path.ray = ray;

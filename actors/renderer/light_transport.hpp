@@ -24,6 +24,14 @@ struct ViewIndependentLight {
   [[nodiscard]] glm::vec3 sum() const { return sharp + soft; }
 };
 
+/// One sample of what leaves a point for one eye alone, and how fast it changes with the eye.
+struct ViewDependentLight {
+  glm::vec3 radiance{0.0f};  ///< nits; finite, >= 0
+  float diffuse_factor = 1;  ///< what the diffuse part of view_independent() is multiplied with for this eye
+  float ggx_alpha = 1;       ///< of the lobes
+  float distance = 0;        ///< to the eye, metres
+};
+
 /// Switches of the estimator. None changes the expectation, except for a `max_bounces` that cuts paths short.
 struct TransportOptions {
   std::uint32_t max_bounces = 32;    ///< scatterings after the first vertex
@@ -68,6 +76,17 @@ class LightTransport {
   [[nodiscard]] float alpha(const SurfacePoint& point) const;
   /// Weight of what is straight behind in the view-independent picture.
   [[nodiscard]] glm::vec3 transparency(const SurfacePoint& point) const;
+
+  /// One sample of the light that leaves `point` towards `eye` (recentred world space) by specular and transmission
+  /// lobes. With it, all light but straight passage is emission + diffuse_factor * (view_independent - emission) +
+  /// radiance: the factor is a function of the angle alone, so it is left to who draws, and costs no noise. A texel's
+  /// plane may face away from an eye that sees the texel beside: the eye is then mirrored to the front. Volumes without
+  /// a boundary are looked straight through.
+  [[nodiscard]] ViewDependentLight view_dependent(const SurfacePoint& point, const glm::vec3& eye,
+                                                  Sampler& sampler) const;
+  /// Share of what is straight behind that a clear surface passes, without Fresnel's term (which needs the eye): tint
+  /// of a thin smooth surface, 0 for everything that blurs or bends.
+  [[nodiscard]] glm::vec3 clear_tint(const SurfacePoint& point) const;
 
   /// One sample of the radiance along a camera ray, every effect included.
   [[nodiscard]] glm::vec3 full_radiance(const trace::Ray& ray, Sampler& sampler) const;

@@ -13,6 +13,14 @@ namespace darm::renderer {
 /// case.
 inline constexpr float kSmallestAlpha = 1e-3f;
 
+/// 1 - Fresnel towards an eye at `cosine` from the normal, over its view average: (1 - m^5) * 21 / 20 by Schlick's
+/// formula, whatever F0.
+[[nodiscard]] inline float diffuse_view_factor(float cosine) {
+  const float m = std::clamp(1.0f - cosine, 0.0f, 1.0f);
+  const float m2 = m * m;
+  return (1.0f - m2 * m2 * m) * 1.05f;
+}
+
 /// glTF metallic-roughness parameters at a point; all finite, colours >= 0, shares 0..1.
 struct MaterialPoint {
   glm::vec3 base{1.0f};

@@ -27,6 +27,8 @@ struct SlotFill {
     spread(true);
     spread(false);
   }
+  /// Within patches only: what has no known texel of its own patch stays zero.
+  void run_within_patches() { spread(true); }
 
  private:
   void spread(bool same_patch_only) {

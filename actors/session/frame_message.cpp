@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <cmath>
+#include <span>
 
 #include "proto/framing.hpp"
 #include "proto/limits.hpp"
@@ -10,11 +11,11 @@
 namespace darm::session {
 namespace {
 
-std::string deflate(const CoverageTile& coverage) {
-  std::string out(compressBound(coverage.size()), '\0');
+std::string deflate(std::span<const std::uint8_t> tile) {
+  std::string out(compressBound(tile.size()), '\0');
   uLongf size = out.size();
   // Cannot fail: the buffer is as large as zlib asks for, and the level is legal.
-  compress2(reinterpret_cast<Bytef*>(out.data()), &size, coverage.data(), coverage.size(), Z_DEFAULT_COMPRESSION);
+  compress2(reinterpret_cast<Bytef*>(out.data()), &size, tile.data(), tile.size(), Z_DEFAULT_COMPRESSION);
   out.resize(size);
   return out;
 }
@@ -30,6 +31,7 @@ SharedBytes serialize_body(const EncodedFrame& frame) {
     edit->set_tile(e.tile.packed);
     edit->set_slot(e.slot);
     if (e.coverage) edit->set_coverage(deflate(*e.coverage));
+    if (e.through) edit->set_through(deflate(*e.through));
   }
   for (const auto& w : frame.lossless) {
     if (!w.image) continue;
@@ -75,9 +77,11 @@ Packet frame_packet(FrameBodies& bodies, const std::shared_ptr<const EncodedFram
   put_stamps(answer.stamps, *own.mutable_stamps());
   packet.tail.resize(own.ByteSizeLong());
   own.SerializeWithCachedSizesToArray(packet.tail.data());
-  // Envelope.frame by hand: tag (field number, wire type 2) and length of body and tail together.
+  // Envelope.frame or view_frame by hand: tag (field number, wire type 2) and length of body and tail together.
   packet.head.resize(proto::kLengthBytes);
-  packet.head.push_back(static_cast<std::uint8_t>((wire::Envelope::kFrameFieldNumber << 3) | 2));
+  const int field =
+      frame->layer == StreamLayer::kView ? wire::Envelope::kViewFrameFieldNumber : wire::Envelope::kFrameFieldNumber;
+  packet.head.push_back(static_cast<std::uint8_t>((field << 3) | 2));
   std::size_t length = packet.body->size() + packet.tail.size();
   const std::size_t message = length;
   for (; length >= 0x80; length >>= 7) packet.head.push_back(static_cast<std::uint8_t>(length | 0x80));

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <thread>
 
+#include "actors/scene/view_materials.hpp"
 #include "actors/session/chart_geometry.hpp"
 #include "proto/darm.pb.h"
 #include "proto/framing.hpp"
@@ -63,6 +64,7 @@ void put_levels(const atlas::Layout& layout, wire::SceneManifest& m) {
 }
 
 void put_instances(const scene::Scene& scene, const atlas::Layout& layout, wire::SceneManifest& m) {
+  const auto view = scene::view_materials(scene);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const auto& instance = scene.instances[i];
     const auto& charts = layout.instances[i];
@@ -80,6 +82,9 @@ void put_instances(const scene::Scene& scene, const atlas::Layout& layout, wire:
     // Only a thin wall lets what is straight behind it through; volumes refract and are opaque tiles.
     info->set_transmission(material.thickness > 0 ? 0.0f : material.transmission);
     info->set_tint_rgb(pack_srgb(glm::vec3(material.base_color)));
+    // Own light is not dimmed by Fresnel's term; what glows and is glossy too keeps the average.
+    const float ratio = (material.ior - 1.0f) / (material.ior + 1.0f);
+    if (view[i].weight > 0 && !material.emits()) info->set_f0(ratio * ratio);
     info->set_object(instance.object);
     info->set_dynamic(instance.object < scene.objects.size() && scene.objects[instance.object].dynamic);
     info->set_camera_sees_back(material.double_sided);

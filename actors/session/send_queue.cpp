@@ -30,30 +30,32 @@ void SendQueue::push_coarse(Packet packet) {
 
 bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer,
                              Microseconds now) {
-  const auto oldest =
-      std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kPicture; });
+  const auto layer = frame->layer;
+  auto& mine = track(layer);
+  const auto oldest = std::find_if(items_.begin(), items_.end(),
+                                   [&](const Item& i) { return i.kind == Kind::kPicture && i.frame->layer == layer; });
   const bool late = oldest != items_.end() && now - oldest->since > limits_.media_age;
   // A single picture may be of any size; only a queue of them is bounded.
-  const bool full = pictures_waiting_ > 0 && picture_waiting_bytes_ + size_of(*frame) > limits_.media_bytes;
-  if (late || full) drop_pictures();
+  const bool full = mine.waiting > 0 && mine.waiting_bytes + size_of(*frame) > limits_.media_bytes;
+  if (late || full) drop_pictures(layer);
   // A key frame makes what waits before it useless, and stands for it.
-  if (frame->key && pictures_waiting_ > 0) drop_pictures();
-  if (bulk_waiting_ > 0 || (key_needed_ && !frame->key)) {
-    key_needed_ = true;
+  if (frame->key && mine.waiting > 0) drop_pictures(layer);
+  if (bulk_waiting_ > 0 || (mine.key_needed && !frame->key)) {
+    mine.key_needed = mine.refused = true;
     ++pictures_dropped_;
     keep_answer(answer);
     return false;
   }
-  key_needed_ = false;
-  key_asked_.reset();
-  picture_waiting_bytes_ += size_of(*frame);
-  ++pictures_waiting_;
+  mine.key_needed = mine.refused = false;
+  mine.key_asked.reset();
+  mine.waiting_bytes += size_of(*frame);
+  ++mine.waiting;
   items_.push_back({Kind::kPicture, {}, frame, answer, 0, now});
   return true;
 }
 
 void SendQueue::push_no_change(const NoChange& event) {
-  if (key_needed_) {
+  if (track(StreamLayer::kShared).key_needed) {
     keep_answer(event.answer);
     return;
   }
@@ -77,15 +79,21 @@ void SendQueue::attach_lost_answer(ViewAnswer& answer) {
   lost_answer_ = {};
 }
 
-void SendQueue::drop_pictures() {
+void SendQueue::drop_pictures(StreamLayer layer) {
+  const auto goes = [layer](const Item& i) {
+    if (i.kind == Kind::kPicture) return i.frame->layer == layer;
+    return i.kind == Kind::kNoChange && layer == StreamLayer::kShared;
+  };
   for (const auto& i : items_) {
-    if (i.kind == Kind::kPicture || i.kind == Kind::kNoChange) keep_answer(i.answer);
+    if (!goes(i)) continue;
+    keep_answer(i.answer);
     if (i.kind == Kind::kPicture) ++pictures_dropped_;
   }
-  std::erase_if(items_, [](const Item& i) { return i.kind == Kind::kPicture || i.kind == Kind::kNoChange; });
-  pictures_waiting_ = 0;
-  picture_waiting_bytes_ = 0;
-  key_needed_ = true;
+  std::erase_if(items_, goes);
+  auto& mine = track(layer);
+  mine.waiting = 0;
+  mine.waiting_bytes = 0;
+  mine.key_needed = mine.refused = true;
 }
 
 std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
@@ -103,9 +111,9 @@ std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make,
     case Kind::kCoarse:
       return std::move(item.packet);
     case Kind::kPicture:
-      --pictures_waiting_;
-      picture_waiting_bytes_ -= size_of(*item.frame);
-      attach_lost_answer(item.answer);
+      --track(item.frame->layer).waiting;
+      track(item.frame->layer).waiting_bytes -= size_of(*item.frame);
+      if (item.frame->layer == StreamLayer::kShared) attach_lost_answer(item.answer);
       item.answer.stamps.sent = now;
       return make(item.frame, item.answer);
     case Kind::kNoChange: {
@@ -116,11 +124,14 @@ std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make,
   return std::nullopt;
 }
 
-bool SendQueue::ask_for_key(Microseconds now) {
-  if (!key_needed_ || bulk_waiting_ > 0 || pictures_waiting_ > 0) return false;
+bool SendQueue::ask_for_key(Microseconds now, StreamLayer layer) {
+  auto& mine = track(layer);
+  // The shared stream begins with a key frame by itself; a private one may never begin.
+  if (!mine.key_needed || (layer == StreamLayer::kView && !mine.refused)) return false;
+  if (bulk_waiting_ > 0 || mine.waiting > 0) return false;
   if (under_way_since_ && now - *under_way_since_ > limits_.media_age) return false;  // it would only wait behind this
-  if (key_asked_ && now - *key_asked_ < kKeyPatience) return false;
-  key_asked_ = now;
+  if (mine.key_asked && now - *mine.key_asked < kKeyPatience) return false;
+  mine.key_asked = now;
   return true;
 }
 
@@ -131,7 +142,8 @@ bool SendQueue::too_slow(Microseconds now) const {
 
 void SendQueue::clear() {
   items_.clear();
-  bulk_waiting_ = control_waiting_bytes_ = picture_waiting_bytes_ = pictures_waiting_ = 0;
+  bulk_waiting_ = control_waiting_bytes_ = 0;
+  for (auto& t : tracks_) t.waiting = t.waiting_bytes = 0;
 }
 
 }  // namespace darm::session

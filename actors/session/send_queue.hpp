@@ -1,6 +1,7 @@
 // What a session still has to send, in order; decides which pictures are dropped when the client cannot keep up.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <deque>
 #include <functional>
@@ -19,8 +20,8 @@ struct SendLimits {
 };
 
 /// First in, first out. Control messages and geometry are never dropped. Pictures are dropped whole, and all that wait
-/// together with the new one, because each builds on the one before; then only a key frame is taken. While geometry
-/// waits no picture is taken. The answer of a dropped picture travels with the next one that is sent. No clock inside:
+/// together with the new one, because each builds on the one before; then only a key frame is taken. The two layers are
+/// streams of their own in this, with limits of their own. While geometry waits no picture is taken. The answer of a dropped picture travels with the next one that is sent. No clock inside:
 /// `now` must not decrease.
 class SendQueue {
  public:
@@ -43,9 +44,9 @@ class SendQueue {
   void sent() { under_way_since_.reset(); }
 
   /// True when a key frame should be asked for: one is needed, there is room for it, and none was asked for lately.
-  [[nodiscard]] bool ask_for_key(Microseconds now);
+  [[nodiscard]] bool ask_for_key(Microseconds now, StreamLayer layer = StreamLayer::kShared);
   /// Something is lost on the client's side: pictures are of no use until the next key frame.
-  void require_key() { key_needed_ = true; }
+  void require_key(StreamLayer layer = StreamLayer::kShared) { track(layer).key_needed = track(layer).refused = true; }
   [[nodiscard]] bool too_slow(Microseconds now) const;
   /// Drops everything that waits; what is under way stays so.
   void clear();
@@ -66,7 +67,16 @@ class SendQueue {
   static std::size_t size_of(const EncodedFrame& frame) {
     return frame.h264.size() + frame.lossless.size() * sizeof(TileImage::rgb) + frame.edits.size() * 8;
   }
-  void drop_pictures();
+  // Pictures of one layer.
+  struct Track {
+    std::size_t waiting_bytes = 0;
+    std::size_t waiting = 0;
+    bool key_needed = true;
+    bool refused = false;  // a picture was turned away: a key frame is of use
+    std::optional<Microseconds> key_asked;
+  };
+  [[nodiscard]] Track& track(StreamLayer layer) { return tracks_[layer == StreamLayer::kView ? 1 : 0]; }
+  void drop_pictures(StreamLayer layer);
   void keep_answer(const ViewAnswer& answer);
   void attach_lost_answer(ViewAnswer& answer);
 
@@ -74,12 +84,9 @@ class SendQueue {
   std::deque<Item> items_;
   std::size_t bulk_waiting_ = 0;
   std::size_t control_waiting_bytes_ = 0;
-  std::size_t picture_waiting_bytes_ = 0;
-  std::size_t pictures_waiting_ = 0;
   std::size_t pictures_dropped_ = 0;
   std::optional<Microseconds> under_way_since_;
-  bool key_needed_ = true;
-  std::optional<Microseconds> key_asked_;
+  std::array<Track, 2> tracks_;
   ViewAnswer lost_answer_;  // sequence 0: none
 };
 

@@ -21,6 +21,7 @@ namespace darm::session {
 /// One encoded picture with everything that must be applied with it. Shared by all sessions of the stream.
 struct EncodedFrame {
   StreamId stream{};
+  StreamLayer layer = StreamLayer::kShared;
   FrameNumber frame = 0;
   bool key = false;
   std::vector<std::uint8_t> h264;            ///< Annex B, parameter sets in band on key frames; empty if lossless

@@ -26,6 +26,13 @@ Packet packet_of(SharedBytes bytes) {
   return p;
 }
 
+// What the client can take of what the server offers; 0: no private layer.
+std::uint32_t view_size(const wire::Hello& hello, const SessionPolicy& policy) {
+  if (policy.view_phystex == 0 || hello.max_view_phystex() < proto::kSmallestViewPhysTex) return 0;
+  if (hello.lossless()) return std::min(std::bit_floor(hello.max_view_phystex()), proto::kLargestLosslessViewPhysTex);
+  return std::min(std::bit_floor(std::min(hello.max_view_phystex(), policy.view_phystex)), proto::kLargestViewPhysTex);
+}
+
 // Printable ASCII only, so that a name cannot forge log lines.
 std::string clean_name(const std::string& text) {
   std::string out = text.substr(0, proto::kMaxClientName);
@@ -105,6 +112,7 @@ std::optional<tile_scheduler::StreamFormat> SessionProtocol::negotiate(const wir
   const std::uint32_t wanted = hello.max_phystex() == 0 ? policy_.phystex_size : hello.max_phystex();
   if (wanted < kSmallestPhysTex) return std::nullopt;
   tile_scheduler::StreamFormat format;
+  format.view_phystex = view_size(hello, policy_);
   if (hello.lossless()) {
     if (!policy_.allow_lossless) return std::nullopt;
     format.lossless_rgb = true;
@@ -160,6 +168,7 @@ void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format) {
   put_pose(policy_.start, policy_.start_viewport, *w->mutable_start());
   w->set_updates_per_second(policy_.updates_per_second);
   w->set_server(policy_.server);
+  w->set_view_phystex(format.view_phystex);
   send(envelope);
 }
 
@@ -183,9 +192,14 @@ void SessionProtocol::on_camera(const wire::CameraUpdate& update, Microseconds n
 }
 
 void SessionProtocol::on_feedback(const wire::Feedback& feedback, Actions& actions) {
-  if (!feedback.key_frame_wanted()) return;
-  queue_.require_key();
-  actions.push_back(tile_scheduler::KeyFrameWanted(id_));
+  if (feedback.key_frame_wanted()) {
+    queue_.require_key(StreamLayer::kShared);
+    actions.push_back(tile_scheduler::KeyFrameWanted(id_));
+  }
+  if (feedback.view_key_frame_wanted()) {
+    queue_.require_key(StreamLayer::kView);
+    actions.push_back(tile_scheduler::KeyFrameWanted(id_, StreamLayer::kView));
+  }
 }
 
 void SessionProtocol::on_ping(const wire::Ping& ping) {
@@ -225,7 +239,7 @@ Actions SessionProtocol::on_frame(const FrameEncoded& event, Microseconds now) {
   Actions actions;
   if (state_ != State::kOpen || !event.frame) return actions;
   if (!queue_.push_picture(event.frame, event.answer, now)) actions.push_back(Noted{"picture_dropped"});
-  ask_for_key(now, actions);
+  ask_for_keys(now, actions);
   return actions;
 }
 
@@ -239,15 +253,17 @@ void SessionProtocol::on_coarse(const CoarseUpdated& event) {
   queue_.push_coarse(packet_of(coarse_message(*event.coarse)));
 }
 
-void SessionProtocol::ask_for_key(Microseconds now, Actions& actions) {
-  if (state_ == State::kOpen && queue_.ask_for_key(now)) actions.push_back(tile_scheduler::KeyFrameWanted(id_));
+void SessionProtocol::ask_for_keys(Microseconds now, Actions& actions) {
+  if (state_ != State::kOpen) return;
+  for (const auto layer : {StreamLayer::kShared, StreamLayer::kView})
+    if (queue_.ask_for_key(now, layer)) actions.push_back(tile_scheduler::KeyFrameWanted(id_, layer));
 }
 
 Actions SessionProtocol::on_sent(Microseconds now) {
   Actions actions;
   queue_.sent();
   // Pictures were turned away while geometry went out: now there is room.
-  if (queue_.pictures_dropped() > 0) ask_for_key(now, actions);
+  if (queue_.pictures_dropped() > 0) ask_for_keys(now, actions);
   return actions;
 }
 
@@ -260,7 +276,7 @@ Actions SessionProtocol::on_tick(Microseconds now) {
   } else if (state_ == State::kOpen && queue_.too_slow(now)) {
     close(wire::Goodbye::TOO_SLOW, "The client does not read what it is sent.", now);
   }
-  if (queue_.pictures_dropped() > 0) ask_for_key(now, actions);
+  if (queue_.pictures_dropped() > 0) ask_for_keys(now, actions);
   return actions;
 }
 

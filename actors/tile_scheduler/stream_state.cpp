@@ -121,7 +121,10 @@ encoder::PageEdit StreamState::edit_of(const TableEdit& edit) const {
   encoder::PageEdit out;
   out.tile = edit.tile;
   out.slot = edit.slot;
-  if (edit.slot != kNoSlot) out.coverage = sent_[edit.slot].image->coverage;
+  if (edit.slot != kNoSlot) {
+    out.coverage = sent_[edit.slot].image->coverage;
+    out.through = sent_[edit.slot].image->through;
+  }
   return out;
 }
 

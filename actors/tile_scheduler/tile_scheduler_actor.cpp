@@ -44,7 +44,8 @@ TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> c
                                        std::shared_ptr<const atlas::Layout> layout,
                                        std::shared_ptr<const renderer::trace::RayScene> rays,
                                        std::shared_ptr<const Peers> peers, SchedulerOptions options,
-                                       runtime::MetricSink& metrics)
+                                       runtime::MetricSink& metrics,
+                                       std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials)
     : Actor(std::move(context)),
       layout_(std::move(layout)),
       rays_(std::move(rays)),
@@ -53,6 +54,8 @@ TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> c
       metrics_(metrics),
       period_(period_of(options.updates_per_second)),
       images_(options.image_bytes) {
+  const bool fits = view_materials && view_materials->size() == layout_->instances.size();
+  if (fits && peers_->view_renderer && scene::calls_for_view_layer(*view_materials)) view_materials_ = view_materials;
   options_.passes_moving = std::clamp(options_.passes_moving, 1, kAllPasses);
   options_.passes_still = std::clamp(options_.passes_still, 1, kAllPasses);
 }
@@ -79,6 +82,7 @@ void TileSchedulerActor::on(SessionOpened&& message) {
   session->stream_id = StreamId{next_stream_++};
   session->encoder = peers_->make_encoder(session->stream_id, message.format);
   peers_->set_receivers(session->stream_id, {message.session});
+  if (view_materials_ && message.format.view_phystex > 0) open_view(*session);
   sessions_.emplace(message.session, std::move(session));
 }
 
@@ -87,6 +91,7 @@ void TileSchedulerActor::on(SessionClosed&& message) {
   if (it == sessions_.end()) return;
   const auto stream = it->second->stream_id;
   const auto encoder = it->second->encoder;
+  close_view(*it->second);
   sessions_.erase(it);
   peers_->set_receivers(stream, {});
   peers_->destroy_encoder(stream, encoder);
@@ -105,29 +110,34 @@ void TileSchedulerActor::on(ViewChanged&& message) {
 void TileSchedulerActor::on(KeyFrameWanted&& message) {
   auto* session = find(message.session);
   if (session == nullptr) return;
-  force_key(*session);
-  if (session->key_put_off)
-    metrics_.count("darm_key_frames_put_off_total", 1);
-  else if (session->set.passes() > 0)
-    compose(*session);
-}
-
-// Makes the session's next frame a key frame, unless it had one on demand just now: then a later tick does.
-void TileSchedulerActor::force_key(Session& session) {
-  session.key_put_off = session.key_forced_at && now_us() - *session.key_forced_at < options_.key_interval;
-  if (session.key_put_off) return;
-  session.key_forced_at = now_us();
-  session.stream.want_key();
+  if (message.layer == StreamLayer::kView) {
+    if (!session->view_layer) return;
+    session->view_layer->stream().want_key();
+    return compose_view(*session);
+  }
+  session->stream.want_key();
+  if (session->set.passes() > 0) compose(*session);
 }
 
 void TileSchedulerActor::on(TilesShaded&& message) {
   for (const auto& tile : message.tiles) pictures_came_ = images_.put(tile) || pictures_came_;
 }
 
+void TileSchedulerActor::on(ViewTilesShaded&& message) {
+  auto* session = find(message.session);
+  if (session == nullptr || !session->view_layer) return;
+  session->view_layer->put(message.tiles);
+  compose_view(*session);
+}
+
 void TileSchedulerActor::on(CoarsePictured&& message) { coarse_ = std::move(message.picture); }
 
 void TileSchedulerActor::on(FrameDone&& message) {
   for (auto& [id, session] : sessions_) {
+    if (session->view_layer && session->view_stream_id == message.stream) {
+      session->view_layer->stream().frame_done(message.frame, message.ok);
+      return;
+    }
     if (session->stream_id != message.stream) continue;
     session->stream.frame_done(message.frame, message.ok);
     if (session->stream.has_answers()) compose(*session);
@@ -158,9 +168,10 @@ void TileSchedulerActor::on(Tick&&) {
     } else if (pictures_came_ && session->set.passes() > 0) {
       grant_available(session->demand, layout_->coarse_level(), session->stream.table(), images(), options_.allocation);
     }
-    if (session->key_put_off) force_key(*session);
+    if (session->view_layer && session->view_layer->expire(now_us())) reallocate_view(*session);
     start_view(*session);
     if (session->set.passes() > 0) compose(*session);
+    compose_view(*session);
   }
   pictures_came_ = false;
   if (work_changed) send_work();
@@ -194,7 +205,8 @@ void TileSchedulerActor::start_view(Session& session) {
   }
   session.last_start = now_us();
   auto job = std::make_shared<ViewJob>(next_job_++, layout_, rays_, session.view->camera, session.view->viewport, done,
-                                       count, 2 * executor().workers());
+                                       count, 2 * executor().workers(),
+                                       session.view_layer ? view_materials_ : nullptr);
   job->answer = answer;
   if (!unanswered) job->answer.sequence = 0;
   job->starts_pose = moved;
@@ -214,6 +226,11 @@ void TileSchedulerActor::finish_view(Session& session) {
   if (job->starts_pose) session.set.start_pose(traced, passes_per_picture(session.posed->viewport));
   for (const auto& part : job->results()) session.set.add(part, 0);
   session.set.add(VisibleSet(), job->pass_count());
+  if (session.view_layer) {
+    if (job->starts_pose) session.view_layer->start_pose(traced);
+    for (const auto& part : job->private_results()) session.view_layer->add(part);
+    reallocate_view(session);
+  }
   reallocate(session);
   send_work();
   auto answer = job->answer;
@@ -268,6 +285,53 @@ void TileSchedulerActor::send_frame(Session& session, encoder::ComposeFrame fram
   // The encoder is gone: a new one starts with a key frame, at the next tick.
   session.encoder = peers_->make_encoder(session.stream_id, session.format);
   session.stream.frame_done(number, false);
+}
+
+// ---- private layers -------------------------------------------------------------------------------------------------
+
+void TileSchedulerActor::open_view(Session& session) {
+  session.view_stream_id = StreamId{next_stream_++};
+  StreamOptions stream = options_.stream;
+  stream.refine_interval = options_.view_refine_interval;
+  session.view_layer.emplace(session.format.view_format(), stream, options_.view);
+  peers_->set_receivers(session.view_stream_id, {session.id});
+}
+
+void TileSchedulerActor::close_view(Session& session) {
+  if (!session.view_layer) return;
+  peers_->view_renderer().tell(renderer::ShadeView(session.id, glm::vec3(0.0f), nullptr));
+  peers_->set_receivers(session.view_stream_id, {});
+  if (session.view_encoder) peers_->destroy_encoder(session.view_stream_id, session.view_encoder);
+}
+
+// Chooses private tiles for what the eye sees, and has them shaded for where it is.
+void TileSchedulerActor::reallocate_view(Session& session) {
+  const auto started = now_us();
+  auto& layer = *session.view_layer;
+  const bool had = layer.target_size() > 0;
+  layer.reallocate(options_.allocation, layout_->coarse_level());
+  metrics_.observe("darm_view_allocation_seconds", double(now_us() - started) * 1e-6);
+  if (layer.target_size() == 0 && !had) return;
+  metrics_.observe("darm_view_private_tiles", double(layer.target_size()));
+  const glm::vec3 eye(session.posed->camera.position - rays_->scene().origin);
+  peers_->view_renderer().tell(renderer::ShadeView(session.id, eye, layer.requests()));
+}
+
+void TileSchedulerActor::compose_view(Session& session) {
+  if (!session.view_layer || session.view_layer->idle()) return;
+  auto step = session.view_layer->step(now_us());
+  if (!step.frame) return;
+  if (!session.view_encoder)
+    session.view_encoder = peers_->make_encoder(session.view_stream_id, session.format.view_format());
+  std::size_t used = 0;
+  for (const auto& [id, other] : sessions_)
+    if (other->view_layer) used += other->view_layer->stream().table().size();
+  metrics_.set("darm_view_slots_used", double(used));
+  metrics_.observe("darm_view_frame_writes", double(step.frame->writes.size()));
+  const auto number = step.frame->frame;
+  if (session.view_encoder.tell(std::move(*step.frame))) return;
+  session.view_encoder = {};  // it is gone: a new one starts with a key frame, at the next tick
+  session.view_layer->stream().frame_done(number, false);
 }
 
 }  // namespace darm::tile_scheduler

@@ -9,11 +9,13 @@
 
 #include "actors/encoder/encoder_messages.hpp"
 #include "actors/renderer/renderer_messages.hpp"
+#include "actors/renderer/view_messages.hpp"
 #include "actors/runtime/actor.hpp"
 #include "actors/runtime/metrics.hpp"
 #include "actors/runtime/registry.hpp"
 #include "actors/session/session_messages.hpp"
 #include "actors/tile_scheduler/image_store.hpp"
+#include "actors/tile_scheduler/private_layer.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
@@ -37,11 +39,14 @@ struct SchedulerOptions {
   WorkingSetOptions working_set;
   AllocationOptions allocation;
   StreamOptions stream;
+  PrivateLayerOptions view;
+  Microseconds view_refine_interval = 100'000;  ///< least time between frames of a private layer that only refine it
 };
 
 /// The scheduler's neighbours, resolved at each use, so that they may be spawned after it. Every member must be set.
 struct Peers {
   std::function<runtime::Ref<renderer::Inbox>()> renderer;
+  std::function<runtime::Ref<renderer::ViewInbox>()> view_renderer;  ///< empty: no session has a private layer
   /// Makes the encoder actor of a stream; also called again where the old one no longer takes messages.
   std::function<runtime::Ref<encoder::Inbox>(StreamId, const StreamFormat&)> make_encoder;
   /// Ends the encoder actor that make_encoder gave.
@@ -54,9 +59,11 @@ struct Peers {
 class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
  public:
   /// `rays` must have been built from the scene that `layout` describes. `metrics` must outlive the actor.
+  /// `view_materials`, by instance: without them, or where none has weight, no session has a private layer.
   TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> context, std::shared_ptr<const atlas::Layout> layout,
                      std::shared_ptr<const renderer::trace::RayScene> rays, std::shared_ptr<const Peers> peers,
-                     SchedulerOptions options, runtime::MetricSink& metrics = runtime::null_metrics());
+                     SchedulerOptions options, runtime::MetricSink& metrics = runtime::null_metrics(),
+                     std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials = nullptr);
 
   void on_start() override;
   void on(SessionOpened&& message);
@@ -64,6 +71,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void on(ViewChanged&& message);
   void on(KeyFrameWanted&& message);
   void on(TilesShaded&& message);
+  void on(ViewTilesShaded&& message);
   void on(CoarsePictured&& message);
   void on(FrameDone&& message);
   void on(ViewTraced&& message);
@@ -89,6 +97,9 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool key_put_off = false;     // asked for again too soon after that
     Microseconds weighed_at = 0;  // of demand.target
     bool pictures_since = false;  // some came after that
+    std::optional<PrivateLayer> view_layer;  // what depends on its eye
+    StreamId view_stream_id{};
+    runtime::Ref<encoder::Inbox> view_encoder;  // made with its first frame
     Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
     ~Session() {
       if (job) job->cancel();  // it goes with the session, and with the scheduler
@@ -109,12 +120,17 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void force_key(Session& session);
   void compose(Session& session);
   void send_frame(Session& session, encoder::ComposeFrame frame);
+  void open_view(Session& session);
+  void close_view(Session& session);
+  void reallocate_view(Session& session);
+  void compose_view(Session& session);
 
   std::shared_ptr<const atlas::Layout> layout_;
   std::shared_ptr<const renderer::trace::RayScene> rays_;
   std::shared_ptr<const Peers> peers_;
   SchedulerOptions options_;
   runtime::MetricSink& metrics_;
+  std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials_;  // null: nothing private
   Microseconds period_;
   ImageStore images_;
   std::shared_ptr<const CoarseLuma> coarse_;  // null: none yet

@@ -19,6 +19,16 @@ struct StreamFormat {
   std::uint32_t phystex_size = 2048;  ///< pixels, square: 1024, 2048 or 4096 (lossless: up to 16384)
   bool chroma_444 = false;
   bool lossless_rgb = false;
+  std::uint32_t view_phystex = 0;  ///< of the private layer: 0 (none), 512 or 1024 (lossless: up to 2048)
+  StreamLayer layer = StreamLayer::kShared;
+
+  /// The private layer's own stream. `view_phystex` > 0.
+  [[nodiscard]] StreamFormat view_format() const {
+    StreamFormat f = *this;
+    f.phystex_size = view_phystex;
+    f.layer = StreamLayer::kView;
+    return f;
+  }
 };
 
 /// A client finished its handshake and is ready for frames.
@@ -52,8 +62,11 @@ struct ViewChanged {
 struct KeyFrameWanted {
   static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
   SessionId session{};
-  explicit KeyFrameWanted(SessionId id) : session(id) {}
-  [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
+  StreamLayer layer = StreamLayer::kShared;
+  explicit KeyFrameWanted(SessionId id, StreamLayer of = StreamLayer::kShared) : session(id), layer(of) {}
+  [[nodiscard]] std::uint64_t key() const {
+    return static_cast<std::uint64_t>(session) * 2 + (layer == StreamLayer::kView ? 1 : 0);
+  }
 };
 
 /// A tile has a new picture. `error` is its estimated RMS display error (0..1), `samples` the mean samples per seen
@@ -70,6 +83,14 @@ struct TilesShaded {
   static constexpr auto kOverflow = runtime::Overflow::kReject;
   std::vector<ShadedTile> tiles;
   explicit TilesShaded(std::vector<ShadedTile> t) : tiles(std::move(t)) {}
+};
+
+/// Private tiles of one session have new pictures, for an eye it had a moment ago.
+struct ViewTilesShaded {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  SessionId session{};
+  std::vector<ShadedTile> tiles;
+  ViewTilesShaded(SessionId id, std::vector<ShadedTile> t) : session(id), tiles(std::move(t)) {}
 };
 
 /// CoarseTex as clients draw it, luma, row-major.
@@ -107,7 +128,7 @@ struct Tick {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
 };
 
-using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, CoarsePictured,
-                           FrameDone, ViewTraced, Tick>;
+using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, ViewTilesShaded,
+                           CoarsePictured, FrameDone, ViewTraced, Tick>;
 
 }  // namespace darm::tile_scheduler

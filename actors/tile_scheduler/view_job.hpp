@@ -19,10 +19,12 @@ inline constexpr std::uint32_t kRaysPerStep = 2048;
 /// may read `results`.
 class ViewJob {
  public:
+  /// `materials`, by instance: gathers also what depends on the eye.
   /// Traces passes [first_pass, first_pass + pass_count) in at most `slices` slices (at least 1).
   ViewJob(std::uint64_t number, std::shared_ptr<const atlas::Layout> layout,
           std::shared_ptr<const renderer::trace::RayScene> rays, const Camera& camera, const Viewport& viewport,
-          int first_pass, int pass_count, unsigned slices);
+          int first_pass, int pass_count, unsigned slices,
+          std::shared_ptr<const std::vector<scene::ViewMaterial>> materials = nullptr);
 
   enum class Step : std::uint8_t { kMore, kSliceDone, kAllDone };
   /// Traces a few milliseconds' worth of rows of a slice: at least one, and no more than kRaysPerStep rays with it.
@@ -37,6 +39,8 @@ class ViewJob {
   [[nodiscard]] int pass_count() const { return pass_count_; }
   [[nodiscard]] bool done() const { return left_.load(std::memory_order_acquire) == 0; }
   [[nodiscard]] const std::vector<VisibleSet>& results() const { return results_; }
+  /// What depends on the eye; empty if no materials were given.
+  [[nodiscard]] const std::vector<PrivateSet>& private_results() const { return private_; }
 
   ViewAnswer answer;         ///< the camera that the result answers; for the owner, slices do not touch it
   bool starts_pose = false;  ///< the result belongs to a new pose
@@ -55,8 +59,9 @@ class ViewJob {
   ViewSampler sampler_;
   int first_pass_;
   int pass_count_;
+  std::shared_ptr<const std::vector<scene::ViewMaterial>> materials_;  // null: nothing private is gathered
   std::vector<VisibleSet> results_;
-  std::vector<Place> places_;  // of each slice
+  std::vector<PrivateSet> private_;
   std::atomic<unsigned> left_;
   std::atomic<bool> cancelled_ = false;
 };

@@ -58,6 +58,7 @@ int ViewSampler::trace(float x, float y, std::array<SurfaceSample, kMaxLayers>& 
 bool ViewSampler::surface_of(const renderer::trace::Hit& hit, const glm::vec3& direction, SurfaceSample& out) const {
   out.patch = layout_.patch_of(hit.instance, hit.triangle, hit.front);
   if (out.patch == kNoPatch) return false;
+  out.instance = hit.instance;
   out.uv = layout_.patch_uv(hit.instance, hit.triangle, hit.u, hit.v);
   const auto& chart = layout_.charts[layout_.instances[hit.instance].chart];
   out.patch_size = chart.patch_size[chart.local_patch[hit.triangle]];

@@ -20,6 +20,7 @@ inline constexpr float kMaxAnisotropy = 64.0f;
 /// A surface seen by a sample.
 struct SurfaceSample {
   PatchId patch = kNoPatch;
+  std::uint32_t instance = 0;
   int level = 0;               ///< sharp level
   glm::vec2 uv{0.0f};          ///< position in the patch, world units
   glm::vec2 patch_size{0.0f};  ///< extent of the patch, world units

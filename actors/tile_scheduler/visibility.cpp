@@ -130,6 +130,11 @@ void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float 
 
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row,
                 VisibleSet& out) {
+  trace_rows(sampler, pass, first_row, last_row, out, {});
+}
+
+void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out,
+                const PrivateSamples& own) {
   const renderer::trace::DenormalsAreZero denormals;
   const auto& viewport = sampler.viewport();
   const float side = block_side(viewport);
@@ -138,6 +143,7 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
   const float early =
       pass < passes_per_picture(viewport) ? 0.5f * side / std::sqrt(static_cast<float>(pass + 1)) : 0.0f;
   const bool note_taps = pass < kTapPasses;
+  const bool gather = own.set != nullptr && !own.materials.empty();
   const auto width = static_cast<float>(viewport.width);
   const auto height = static_cast<float>(viewport.height);
   const auto columns = block_columns(viewport);
@@ -150,12 +156,15 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
       const float x = static_cast<float>(column) * side + offset.x;
       if (x >= width) break;
       const int layers = sampler.trace(x, y, surfaces);
-      for (int i = 0; i < layers; ++i)
-        add_sample(sampler.layout(), surfaces[static_cast<std::size_t>(i)], early, note_taps, out);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(layers); ++i) {
+        add_sample(sampler.layout(), surfaces[i], early, note_taps, out);
+        if (gather) own.set->add(sampler.layout(), surfaces[i], own.materials[surfaces[i].instance], early);
+      }
       ++samples;
     }
   }
   out.add_samples(samples);
+  if (gather) own.set->add_samples(samples);
 }
 
 }  // namespace darm::tile_scheduler

@@ -4,7 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
+#include <span>
 
+#include "actors/scene/view_materials.hpp"
+#include "actors/tile_scheduler/private_set.hpp"
 #include "actors/tile_scheduler/view_sampler.hpp"
 #include "actors/tile_scheduler/visible_set.hpp"
 
@@ -40,6 +43,14 @@ inline constexpr std::array<glm::vec2, 4> kClientSamples{
 /// Traces rows [first_row, last_row) of blocks in pass `pass` into `out`. In the first passes_per_picture() passes each
 /// sample also marks the texels around it that the unseen pixels of its block probably read (TileUse::early).
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out);
+
+/// What of the samples depends on the eye, gathered beside them.
+struct PrivateSamples {
+  std::span<const scene::ViewMaterial> materials;  ///< by instance; empty: nothing is gathered
+  PrivateSet* set = nullptr;
+};
+void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out,
+                const PrivateSamples& own);
 
 /// Chain of a surface sample: its tile at the sharp level and at up to three coarser ones.
 [[nodiscard]] Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample);

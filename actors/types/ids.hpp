@@ -14,6 +14,9 @@ enum class StreamId : std::uint32_t {};
 /// Index of a patch over the whole scene: instance base + local id (DESIGN "Instances and bodies").
 enum class PatchId : std::uint32_t {};
 
+/// Which of a session's two pictures: light for everybody, or light for its eye alone (DESIGN "Two layers").
+enum class StreamLayer : std::uint8_t { kShared, kView };
+
 inline constexpr PatchId kNoPatch{0xffffffffu};
 
 /// Number of a frame within its stream, starting at 1. Ties an H.264 picture to its page-table delta.

@@ -41,7 +41,10 @@ struct Item {
   double distance = 0;
 };
 
-enum class Pass : std::uint8_t { kDepth, kColour, kStats };
+enum class Pass : std::uint8_t { kDepth, kColour, kStats, kThrough };
+
+// Surfaces whose faces a draw call shows.
+enum class Faces : std::uint8_t { kAll, kBacks, kFronts };
 
 }  // namespace
 
@@ -72,6 +75,11 @@ struct GlesRenderer::State {
   Result<void> draw_scene(const SceneModel& scene, const View& view, bool stats_pass);
   void set_frame_uniforms(gles::Program& program, const SceneModel& scene) const;
   void set_blending(const InstanceShape& instance) const;
+  Result<gles::Program*> use_program(const SceneModel& scene, const InstanceShape& instance, Pass pass, bool blend);
+  Result<void> draw_item(const SceneModel& scene, const View& view, const Item& item, const glm::dmat4& to_clip,
+                         Pass pass, bool blend, Faces faces);
+  Result<void> draw_clear_item(const SceneModel& scene, const View& view, const Item& item, const glm::dmat4& to_clip);
+  gles::Program* current = nullptr;  // whose frame uniforms are set
 };
 
 namespace {
@@ -113,7 +121,7 @@ glm::dmat4 world_to_clip(const SceneModel& scene, const View& view, bool reverse
 Result<gles::Program*> GlesRenderer::State::surface(const SurfaceVariant& variant) {
   const auto found = surfaces.find(variant.bits());
   if (found != surfaces.end()) return &found->second;
-  auto program = gles::Program::link(surface_vertex_source(), surface_fragment_source(variant));
+  auto program = gles::Program::link(surface_vertex_source(variant.view), surface_fragment_source(variant));
   if (!program) return std::unexpected(program.error());
   program->use();
   glUniform1i(program->at("u_places"), kPlacesUnit);
@@ -125,6 +133,11 @@ Result<gles::Program*> GlesRenderer::State::surface(const SurfaceVariant& varian
   glUniform1i(program->at("u_coarse_y"), kCoarseYUnit);
   glUniform1i(program->at("u_coarse_cb"), kCoarseCbUnit);
   glUniform1i(program->at("u_coarse_cr"), kCoarseCrUnit);
+  glUniform1i(program->at("u_view_pages"), kViewPagesUnit);
+  glUniform1i(program->at(variant.lossless ? "u_view_rgb" : "u_view_y"), kViewYUnit);
+  glUniform1i(program->at("u_view_cb"), kViewCbUnit);
+  glUniform1i(program->at("u_view_cr"), kViewCrUnit);
+  glUniform1i(program->at("u_through"), kThroughUnit);
   return &surfaces.emplace(variant.bits(), std::move(*program)).first->second;
 }
 
@@ -141,6 +154,8 @@ void GlesRenderer::State::set_frame_uniforms(gles::Program& program, const Scene
   glUniform1f(program.at("u_q_per_pixel"), scene.q() * static_cast<float>(kSamplesPerAxis));
   glUniform1f(program.at("u_phys_size"), static_cast<float>(shape.phystex_size));
   glUniform1f(program.at("u_chroma_step"), textures.chroma_444() ? 1.0f : 0.5f);
+  glUniform1f(program.at("u_view_size"), static_cast<float>(textures.view_size()));
+  glUniform1f(program.at("u_view_chroma_step"), textures.view_444() ? 1.0f : 0.5f);
   glUniform2f(program.at("u_coarse_size"), static_cast<float>(textures.coarse_width()),
               static_cast<float>(textures.coarse_height()));
   const glm::vec3& sky = scene.background().horizon;
@@ -239,46 +254,93 @@ void GlesRenderer::State::draw_background(const SceneModel& scene, const View& v
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+Result<gles::Program*> GlesRenderer::State::use_program(const SceneModel& scene, const InstanceShape& instance,
+                                                        Pass pass, bool blend) {
+  gles::Program* program = &*depth;
+  if (pass != Pass::kDepth) {
+    SurfaceVariant variant;
+    variant.lossless = shape.lossless;
+    variant.mask = instance.alpha_mode == AlphaMode::kMask;
+    variant.blend = blend && instance.alpha_mode == AlphaMode::kBlend;
+    variant.linear = linear;
+    variant.stats = pass == Pass::kStats;
+    variant.view = textures.has_view() && pass != Pass::kStats;
+    variant.through = pass == Pass::kThrough;
+    auto found = surface(variant);
+    if (!found) return std::unexpected(found.error());
+    program = *found;
+  }
+  if (program != current) {
+    program->use();
+    if (pass != Pass::kDepth) set_frame_uniforms(*program, scene);
+    current = program;
+  }
+  return program;
+}
+
+Result<void> GlesRenderer::State::draw_item(const SceneModel& scene, const View& view, const Item& item,
+                                            const glm::dmat4& to_clip, Pass pass, bool blend, Faces faces) {
+  const auto& instance = scene.instances()[item.instance];
+  auto found = use_program(scene, instance, pass, blend);
+  if (!found) return std::unexpected(found.error());
+  gles::Program& program = **found;
+  const glm::mat4 matrix(to_clip * glm::dmat4(instance.to_world));
+  glUniformMatrix4fv(program.at("u_to_clip"), 1, GL_FALSE, glm::value_ptr(matrix));
+  if (pass != Pass::kDepth) {
+    glUniform1ui(program.at("u_front_base"), instance.front_base);
+    glUniform1ui(program.at("u_back_base"), instance.back_base);
+    glUniform1f(program.at("u_cutoff"), instance.alpha_cutoff);
+  }
+  if (textures.has_view() && (pass == Pass::kColour || pass == Pass::kThrough)) {
+    glm::dmat4 from_eye(instance.to_world);
+    from_eye[3] -= glm::dvec4(view.position - scene.origin(), 0.0);
+    const glm::mat4 from_eye_f(from_eye);
+    const glm::vec3 tint = instance.tint * instance.transmission;
+    glUniformMatrix4fv(program.at("u_from_eye"), 1, GL_FALSE, glm::value_ptr(from_eye_f));
+    glUniform3fv(program.at("u_tint"), 1, glm::value_ptr(tint));
+    glUniform1f(program.at("u_f0"), instance.f0);
+  }
+  glFrontFace(instance.flipped ? GL_CW : GL_CCW);  // makes gl_FrontFacing the scene's front
+  if (instance.camera_sees_back && faces == Faces::kAll) {
+    glDisable(GL_CULL_FACE);
+  } else {
+    glEnable(GL_CULL_FACE);
+    glCullFace(faces == Faces::kBacks ? GL_FRONT : GL_BACK);
+  }
+  const GpuChunk& gpu = chunks[item.chunk];
+  glBindVertexArray(gpu.array.id());
+  glDrawElements(GL_TRIANGLES, gpu.index_count, GL_UNSIGNED_INT, nullptr);
+  glCullFace(GL_BACK);
+  return {};
+}
+
+// Far faces before near ones, each twice: what is behind is multiplied by what comes through, then their light is added.
+Result<void> GlesRenderer::State::draw_clear_item(const SceneModel& scene, const View& view, const Item& item,
+                                                  const glm::dmat4& to_clip) {
+  const bool both = scene.instances()[item.instance].camera_sees_back;
+  for (const Faces faces : {Faces::kBacks, Faces::kFronts}) {
+    if (faces == Faces::kBacks && !both) continue;
+    glBlendFunc(GL_ZERO, GL_SRC_COLOR);
+    if (auto ok = draw_item(scene, view, item, to_clip, Pass::kThrough, true, faces); !ok) return ok;
+    glBlendFunc(GL_SRC_ALPHA, GL_ONE);
+    if (auto ok = draw_item(scene, view, item, to_clip, Pass::kColour, true, faces); !ok) return ok;
+  }
+  return {};
+}
+
 Result<void> GlesRenderer::State::draw_items(const SceneModel& scene, const View& view, const std::vector<Item>& items,
                                              Pass pass, bool blend) {
   const glm::dmat4 to_clip = world_to_clip(scene, view, clip_control != nullptr);
-  gles::Program* current = nullptr;
+  current = nullptr;
   for (const Item& item : items) {
     const auto& instance = scene.instances()[item.instance];
-    const bool mask = instance.alpha_mode == AlphaMode::kMask;
-    if (pass == Pass::kDepth && mask) continue;
-    const glm::dmat4 matrix = to_clip * glm::dmat4(instance.to_world);
-    if (outside(scene.chunks()[item.chunk], matrix)) continue;
-    gles::Program* program = &*depth;
-    if (pass != Pass::kDepth) {
-      const SurfaceVariant variant{shape.lossless, mask, blend && instance.alpha_mode == AlphaMode::kBlend, linear,
-                                   pass == Pass::kStats};
-      auto found = surface(variant);
-      if (!found) return std::unexpected(found.error());
-      program = *found;
-    }
-    if (program != current) {
-      program->use();
-      if (pass != Pass::kDepth) set_frame_uniforms(*program, scene);
-      current = program;
-    }
-    const glm::mat4 matrix_f(matrix);
-    glUniformMatrix4fv(program->at("u_to_clip"), 1, GL_FALSE, glm::value_ptr(matrix_f));
-    if (pass != Pass::kDepth) {
-      glUniform1ui(program->at("u_front_base"), instance.front_base);
-      glUniform1ui(program->at("u_back_base"), instance.back_base);
-      glUniform1f(program->at("u_cutoff"), instance.alpha_cutoff);
-    }
-    if (blend) set_blending(instance);
-    glFrontFace(instance.flipped ? GL_CW : GL_CCW);  // makes gl_FrontFacing the scene's front
-    if (instance.camera_sees_back) {
-      glDisable(GL_CULL_FACE);
-    } else {
-      glEnable(GL_CULL_FACE);
-    }
-    const GpuChunk& gpu = chunks[item.chunk];
-    glBindVertexArray(gpu.array.id());
-    glDrawElements(GL_TRIANGLES, gpu.index_count, GL_UNSIGNED_INT, nullptr);
+    if (pass == Pass::kDepth && instance.alpha_mode == AlphaMode::kMask) continue;
+    if (outside(scene.chunks()[item.chunk], to_clip * glm::dmat4(instance.to_world))) continue;
+    const bool clear = blend && pass == Pass::kColour && instance.transmission > 0 && textures.has_view();
+    if (blend && !clear) set_blending(instance);
+    auto ok = clear ? draw_clear_item(scene, view, item, to_clip)
+                    : draw_item(scene, view, item, to_clip, pass, blend, Faces::kAll);
+    if (!ok) return ok;
   }
   return {};
 }
@@ -359,6 +421,10 @@ Result<void> GlesRenderer::synchronise(const SceneModel& scene, StreamPlayer& pl
   for (auto i = static_cast<std::uint32_t>(state_->chunks.size()); i < scene.chunks().size(); ++i)
     state_->add_chunk(scene, i);
   return state_->textures.upload(player);
+}
+
+Result<void> GlesRenderer::synchronise_view(const SceneModel& scene, StreamPlayer& player) {
+  return state_->textures.upload_view(player, scene);
 }
 
 Result<void> GlesRenderer::draw(const SceneModel& scene, const View& view) {

@@ -34,6 +34,9 @@ class GlesRenderer {
 
   /// Uploads what came since the last call: chunks, slots, pages, CoarseTex. The scene is that of create().
   [[nodiscard]] Result<void> synchronise(const SceneModel& scene, StreamPlayer& player);
+  /// The same for the private layer. Once called, pictures show it: linear(shared) + linear(view), and clear surfaces
+  /// pass what is behind by their private tiles.
+  [[nodiscard]] Result<void> synchronise_view(const SceneModel& scene, StreamPlayer& player);
   /// Draws into a picture of view.width x view.height for read_picture() and present().
   [[nodiscard]] Result<void> draw(const SceneModel& scene, const View& view);
   /// Copies the last picture to a framebuffer (0: the window's) of at least its size.

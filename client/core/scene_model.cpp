@@ -115,11 +115,13 @@ Result<void> SceneModel::read_instances(const wire::SceneManifest& manifest) {
     if (info.alpha_mode() > 2) return fail("manifest: unknown alpha mode");
     instance.alpha_mode = static_cast<AlphaMode>(info.alpha_mode());
     has_alpha_ = has_alpha_ || instance.alpha_mode != AlphaMode::kOpaque;
-    if (!std::isfinite(info.alpha_cutoff()) || !std::isfinite(info.transmission()))
+    if (!std::isfinite(info.alpha_cutoff()) || !std::isfinite(info.transmission()) || !std::isfinite(info.f0()))
       return fail("manifest: NaN in an instance");
     instance.alpha_cutoff = info.alpha_cutoff();
     instance.transmission = std::clamp(info.transmission(), 0.0f, 1.0f);
     instance.tint = unpack_linear(info.tint_rgb());
+    instance.f0 = std::clamp(info.f0(), 0.0f, 1.0f);
+    has_clear_ = has_clear_ || instance.transmission > 0;
     instance.camera_sees_back = info.camera_sees_back();
     auto& highest = highest_base_[instance.chart];
     highest = std::max(highest, instance.front_base);

@@ -52,6 +52,7 @@ struct InstanceShape {
   float alpha_cutoff = 0.5f;
   float transmission = 0;
   glm::vec3 tint{1.0f};  ///< linear
+  float f0 = 0;          ///< > 0: with the private layer, what is not reflected is dimmed by 1 - Fresnel
   bool camera_sees_back = true;
 };
 
@@ -100,6 +101,7 @@ class SceneModel {
   [[nodiscard]] const glm::vec3& high() const { return high_; }
   [[nodiscard]] const Background& background() const { return background_; }
   [[nodiscard]] bool has_alpha() const { return has_alpha_; }
+  [[nodiscard]] bool has_clear() const { return has_clear_; }  ///< some surface shows what is behind it, tinted
   [[nodiscard]] std::uint64_t scene_hash() const { return scene_hash_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }  ///< of the chunks that have come
   /// Level of a tile's page-table entry is known from TileId: level << 28 | index. False if there is no such tile.
@@ -129,6 +131,7 @@ class SceneModel {
   glm::vec3 low_{0.0f}, high_{0.0f};
   Background background_;
   bool has_alpha_ = false;
+  bool has_clear_ = false;
 };
 
 /// Most elements of `stride` bytes that a meshopt vertex buffer of `bytes` can hold: each block of at most 256 spends

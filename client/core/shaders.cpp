@@ -51,6 +51,26 @@ uniform sampler2D u_cb;
 uniform sampler2D u_cr;
 uniform float u_chroma_step;   // 0.5: 4:2:0, 1: 4:4:4
 #endif
+#ifdef VIEW
+uniform usampler2D u_view_pages;
+uniform float u_view_size;     // pixels
+#ifdef LOSSLESS
+uniform sampler2D u_view_rgb;
+#else
+uniform sampler2D u_view_y;
+uniform sampler2D u_view_cb;
+uniform sampler2D u_view_cr;
+uniform float u_view_chroma_step;
+#endif
+#endif
+#ifdef VIEW
+in vec3 v_from_eye;            // world axes
+uniform float u_f0;            // 0: nothing is dimmed by Fresnel's term
+#endif
+#ifdef THROUGH
+uniform sampler2D u_through;
+uniform vec3 u_tint;           // passed where no private tile says better
+#endif
 uniform sampler2D u_coverage;
 uniform sampler2D u_coarse_y;
 uniform sampler2D u_coarse_cb;
@@ -75,42 +95,69 @@ vec2 texel_of(uint patch_id, int level) {
 }
 
 // Light at a texel of a resident slot. `at` is the position inside the slot, in [1, 31].
+#ifndef LOSSLESS
+vec3 planes_light(sampler2D y, sampler2D cb, sampler2D cr, float size, float step, vec2 corner, vec2 at) {
+  float luma = textureLod(y, (corner + at) / size, 0.0).r;
+  // Chroma is never sampled across a slot.
+  vec2 c = clamp(at * step, vec2(0.5), vec2(32.0 * step - 0.5));
+  vec2 where = (corner * step + c) / (size * step);
+  return to_rgb(luma, textureLod(cb, where, 0.0).r, textureLod(cr, where, 0.0).r);
+}
+#endif
 vec3 slot_light(vec2 corner, vec2 at) {
 #ifdef LOSSLESS
   return textureLod(u_rgb, (corner + at) / u_phys_size, 0.0).rgb;
 #else
-  float luma = textureLod(u_y, (corner + at) / u_phys_size, 0.0).r;
-  // Chroma is never sampled across a slot.
-  vec2 c = clamp(at * u_chroma_step, vec2(0.5), vec2(32.0 * u_chroma_step - 0.5));
-  vec2 where = (corner * u_chroma_step + c) / (u_phys_size * u_chroma_step);
-  return to_rgb(luma, textureLod(u_cb, where, 0.0).r, textureLod(u_cr, where, 0.0).r);
+  return planes_light(u_y, u_cb, u_cr, u_phys_size, u_chroma_step, corner, at);
 #endif
 }
+
+// The slot that serves level `l`, or false. `corner`: its place; `at`: where the sample lies in it.
+bool find_slot(usampler2D pages, float size, uint patch_id, int l, out vec2 corner, out vec2 at) {
+  vec2 texel = texel_of(patch_id, l);
+  vec2 tile = floor(texel / 30.0);
+  vec4 shape = u_levels[l];
+  if (any(lessThan(tile, vec2(0.0))) || any(greaterThanEqual(tile, shape.zw))) return false;
+  uint entry = uint(shape.y) + uint(tile.y) * uint(shape.z) + uint(tile.x);
+  uint slot = texelFetch(pages, ivec2(table(entry)), 0).r;
+  if (slot == 65535u) return false;
+  uint per_row = uint(size) / 32u;
+  corner = vec2(slot % per_row, slot / per_row) * 32.0;
+  at = texel - tile * 30.0 + 1.0;
+  return true;
+}
+
+#ifdef VIEW
+vec3 view_light(vec2 corner, vec2 at) {
+#ifdef LOSSLESS
+  return textureLod(u_view_rgb, (corner + at) / u_view_size, 0.0).rgb;
+#else
+  return planes_light(u_view_y, u_view_cb, u_view_cr, u_view_size, u_view_chroma_step, corner, at);
+#endif
+}
+#endif
 
 void main() {
   // Derivatives first, in uniform control flow, and of uv alone.
   vec2 dx = dFdx(v_uv) * u_q_per_pixel;
   vec2 dy = dFdy(v_uv) * u_q_per_pixel;
+#ifdef VIEW
+  // Fresnel's term by the facet: a client has no normals.
+  float m = 1.0 - abs(dot(normalize(cross(dFdx(v_from_eye), dFdy(v_from_eye))), normalize(v_from_eye)));
+  float m5 = m * m * m * m * m;
+#endif
   int level = sharp_level(dx, dy);
   uint base = (gl_FrontFacing || u_back_base == 0xffffffffu) ? u_front_base : u_back_base;
   uint patch_id = min(base + v_patch, u_patch_count - 1u);
 
   vec3 light = u_missing;
+  vec2 corner = vec2(0.0), at = vec2(0.0);
   float coverage = 1.0;
   float source = 0.0;
   for (int k = 0; k < 4; ++k) {
     int l = level + k;
     if (l >= u_level_count) break;
-    vec2 texel = texel_of(patch_id, l);
-    vec2 tile = floor(texel / 30.0);
-    vec4 shape = u_levels[l];
-    if (any(lessThan(tile, vec2(0.0))) || any(greaterThanEqual(tile, shape.zw))) continue;
-    uint entry = uint(shape.y) + uint(tile.y) * uint(shape.z) + uint(tile.x);
-    uint slot = texelFetch(u_pages, ivec2(table(entry)), 0).r;
-    if (slot == 65535u) continue;
-    uint per_row = uint(u_phys_size) / 32u;
-    vec2 corner = vec2(slot % per_row, slot / per_row) * 32.0;
-    vec2 at = texel - tile * 30.0 + 1.0;
+    if (!find_slot(u_pages, u_phys_size, patch_id, l, corner, at)) continue;
     light = slot_light(corner, at);
 #if defined(MASK) || defined(BLEND)
     coverage = textureLod(u_coverage, (corner + at) / u_phys_size, 0.0).r;
@@ -129,30 +176,76 @@ void main() {
   if (coverage < u_cutoff) discard;
   coverage = 1.0;
 #endif
+#ifdef VIEW
+  vec3 own = vec3(0.0);
+  float factor = 1.0;
+#ifdef THROUGH
+  vec3 through = u_tint;
+#endif
+  for (int k = 0; k < 4; ++k) {
+    int l = level + k;
+    if (l >= u_level_count) break;
+    if (!find_slot(u_view_pages, u_view_size, patch_id, l, corner, at)) continue;
+#ifdef THROUGH
+    through = to_linear(textureLod(u_through, (corner + at) / u_view_size, 0.0).rgb);
+#else
+    own = to_linear(view_light(corner, at));
+    // Shared light has the mean over all eyes, 20 / 21 (1 - f0); this one has (1 - f0) (1 - m^5).
+    if (u_f0 > 0.0) factor = 1.05 * (1.0 - m5);
+#endif
+    break;
+  }
+#endif
 #ifdef STATS
   o_colour = vec4(source / 8.0, 0.0, 0.0, 1.0);
+#elif defined(THROUGH)
+  if (u_f0 > 0.0) through *= (1.0 - u_f0) * (1.0 - m5);
+#ifdef BLEND
+  through += 1.0 - coverage;
+#endif
+#ifdef LINEAR
+  o_colour = vec4(through, 1.0);
+#else
+  o_colour = vec4(to_srgb(through), 1.0);
+#endif
+#else
+#ifdef VIEW
+  vec3 sum = min(to_linear(light) * factor + own, vec3(1.0));
+#ifdef LINEAR
+  o_colour = vec4(sum, coverage);
+#else
+  o_colour = vec4(to_srgb(sum), coverage);
+#endif
 #elif defined(LINEAR)
   o_colour = vec4(to_linear(light), coverage);
 #else
   o_colour = vec4(light, coverage);
+#endif
 #endif
 }
 )";
 
 }  // namespace
 
-std::string surface_vertex_source() {
-  return std::string(kHeader) + R"(
+std::string surface_vertex_source(bool view) {
+  return std::string(kHeader) + (view ? "#define VIEW\n" : "") + R"(
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in vec2 a_uv;
 layout(location = 2) in uint a_patch;
 uniform mat4 u_to_clip;
+#ifdef VIEW
+uniform mat4 u_from_eye;  // node space -> world axes, the eye at the origin
+out vec3 v_from_eye;
+#endif
 out vec2 v_uv;
 flat out uint v_patch;
 invariant gl_Position;  // the depth pass must give the same depths
 void main() {
   v_uv = a_uv;
   v_patch = a_patch;
+#ifdef VIEW
+  v_from_eye = (u_from_eye * vec4(a_position, 1.0)).xyz;
+#endif
   gl_Position = u_to_clip * vec4(a_position, 1.0);
 }
 )";
@@ -165,6 +258,8 @@ std::string surface_fragment_source(const SurfaceVariant& variant) {
   if (variant.blend) source += "#define BLEND\n";
   if (variant.linear) source += "#define LINEAR\n";
   if (variant.stats) source += "#define STATS\n";
+  if (variant.view) source += "#define VIEW\n";
+  if (variant.through) source += "#define THROUGH\n";
   return source + kSurfaceUniforms + kColour + kSurfaceBody;
 }
 

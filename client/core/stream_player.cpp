@@ -16,13 +16,13 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
 }
 
-// Exactly one slot of coverage, or nothing.
-std::optional<std::string> inflate_coverage(const std::string& packed) {
-  std::string out(kSlotTexels, '\0');
-  uLongf size = kSlotTexels;
+// Exactly `bytes` of one slot, or nothing.
+std::optional<std::string> inflate_slot(const std::string& packed, std::size_t bytes) {
+  std::string out(bytes, '\0');
+  uLongf size = bytes;
   const int code = uncompress(reinterpret_cast<Bytef*>(out.data()), &size,
                               reinterpret_cast<const Bytef*>(packed.data()), packed.size());
-  if (code != Z_OK || size != kSlotTexels) return std::nullopt;
+  if (code != Z_OK || size != bytes) return std::nullopt;
   return out;
 }
 
@@ -35,7 +35,8 @@ StreamPlayer::StreamPlayer(VideoDecoder decoder, VideoDecoder still_decoder, con
       shape_(shape),
       pages_(scene.tile_count()),
       slot_tile_(shape.slot_count(), kNoTile),
-      slot_masked_(shape.slot_count(), false) {}
+      slot_masked_(shape.slot_count(), false),
+      slot_clear_(shape.slot_count(), false) {}
 
 Result<StreamPlayer> StreamPlayer::create(const SceneModel& scene, const StreamShape& shape) {
   const std::uint32_t most = shape.lossless ? 16384 : 4096;
@@ -62,10 +63,16 @@ Result<std::vector<StreamPlayer::Edit>> StreamPlayer::read_edits(const wire::Str
       return fail(fmt::format("frame {}: no such slot {}", frame.frame(), info.slot()));
     edit.slot = static_cast<std::uint16_t>(info.slot());
     if (!info.coverage().empty()) {
-      auto coverage = inflate_coverage(info.coverage());
+      auto coverage = inflate_slot(info.coverage(), kSlotTexels);
       if (!coverage)
         return fail(fmt::format("frame {}: coverage of tile {:#x} is not 32x32", frame.frame(), info.tile()));
       edit.coverage = std::move(*coverage);
+    }
+    if (!info.through().empty()) {
+      auto through = inflate_slot(info.through(), kSlotTexels * 3);
+      if (!through)
+        return fail(fmt::format("frame {}: through of tile {:#x} is not 32x32x3", frame.frame(), info.tile()));
+      edit.through = std::move(*through);
     }
     edits.push_back(std::move(edit));
   }
@@ -123,6 +130,13 @@ void StreamPlayer::commit(const wire::StreamFrame& frame, std::vector<Edit> edit
     if (edit.slot == kAbsent) continue;
     const bool same_tile = slot_tile_[edit.slot] == edit.entry;
     slot_tile_[edit.slot] = edit.entry;
+    if (!edit.through.empty()) {
+      through_[edit.slot] = std::move(edit.through);
+      slot_clear_[edit.slot] = true;
+    } else if (!same_tile && slot_clear_[edit.slot]) {
+      through_[edit.slot] = std::string(kSlotTexels * 3, '\0');
+      slot_clear_[edit.slot] = false;
+    }
     if (!edit.coverage.empty()) {
       coverage_[edit.slot] = std::move(edit.coverage);
       slot_masked_[edit.slot] = true;

@@ -63,12 +63,15 @@ class StreamPlayer {
   using SlotBytes = std::unordered_map<std::uint16_t, std::string>;
   [[nodiscard]] SlotBytes take_pixels() { return std::exchange(pixels_, {}); }
   [[nodiscard]] SlotBytes take_coverage() { return std::exchange(coverage_, {}); }
+  /// Of a private layer: what clear surfaces pass, sRGB (32 * 32 * 3 bytes).
+  [[nodiscard]] SlotBytes take_through() { return std::exchange(through_, {}); }
 
  private:
   struct Edit {
     std::uint32_t entry;
     std::uint16_t slot;
     std::string coverage;  // inflated; empty: opaque
+    std::string through;   // inflated; empty: nothing clear
   };
   StreamPlayer(VideoDecoder decoder, VideoDecoder still_decoder, const SceneModel& scene, const StreamShape& shape);
   [[nodiscard]] Result<std::vector<Edit>> read_edits(const wire::StreamFrame& frame, const SceneModel& scene) const;
@@ -82,8 +85,9 @@ class StreamPlayer {
   PageTable pages_;
   std::vector<std::uint32_t> slot_tile_;  // whose coverage lies in the slot
   std::vector<bool> slot_masked_;         // the slot's coverage is not all 255
+  std::vector<bool> slot_clear_;          // the slot's share of what is behind is not all 0
   Picture picture_, next_picture_, coarse_;
-  SlotBytes pixels_, coverage_;
+  SlotBytes pixels_, coverage_, through_;
   std::uint64_t last_frame_ = 0;
   std::uint64_t frames_lost_ = 0;
   bool key_wanted_ = true;

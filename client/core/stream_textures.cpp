@@ -53,17 +53,8 @@ Result<StreamTextures> StreamTextures::create(const SceneModel& scene, const Str
   t.places_ = std::move(*places);
   const std::uint32_t page_rows = PageTable(scene.tile_count()).rows();
   if (page_rows > t.largest_) return fail("manifest: the page table is larger than a texture of this GL");
-  t.pages_ = gles::make_texture(GL_R16UI, kTableWidth, page_rows, GL_NEAREST);
+  t.shared_.make(page_rows, shape);
   const std::uint32_t size = shape.phystex_size;
-  t.chroma_444_ = shape.chroma_444;
-  if (shape.lossless) {
-    t.y_ = gles::make_texture(GL_RGB8, size, size, GL_LINEAR);
-  } else {
-    const std::uint32_t chroma = shape.chroma_444 ? size : size / 2;
-    t.y_ = plane(size, size);
-    t.cb_ = plane(chroma, chroma);
-    t.cr_ = plane(chroma, chroma);
-  }
   if (scene.has_alpha()) {
     t.coverage_ = plane(size, size);
     const std::vector<std::uint8_t> full(std::size_t{size} * size, 255);
@@ -76,16 +67,42 @@ Result<StreamTextures> StreamTextures::create(const SceneModel& scene, const Str
   return t;
 }
 
-Result<void> StreamTextures::upload_picture(const Picture& p) {
-  if (p.chroma_444 != chroma_444_) {  // what the stream really carries wins over what was announced
-    chroma_444_ = p.chroma_444;
-    cb_ = plane(p.chroma_width(), p.chroma_height());
-    cr_ = plane(p.chroma_width(), p.chroma_height());
+void StreamTextures::Slots::make(std::uint32_t page_rows, const StreamShape& shape) {
+  pages = gles::make_texture(GL_R16UI, kTableWidth, page_rows, GL_NEAREST);
+  size = shape.phystex_size;
+  chroma_444 = shape.chroma_444;
+  if (shape.lossless) {
+    y = gles::make_texture(GL_RGB8, size, size, GL_LINEAR);
+    return;
   }
-  put(y_, 0, 0, p.width, p.height, GL_RED, GL_UNSIGNED_BYTE, p.y.data());
-  put(cb_, 0, 0, p.chroma_width(), p.chroma_height(), GL_RED, GL_UNSIGNED_BYTE, p.cb.data());
-  put(cr_, 0, 0, p.chroma_width(), p.chroma_height(), GL_RED, GL_UNSIGNED_BYTE, p.cr.data());
-  return {};
+  const std::uint32_t chroma = shape.chroma_444 ? size : size / 2;
+  y = plane(size, size);
+  cb = plane(chroma, chroma);
+  cr = plane(chroma, chroma);
+}
+
+void StreamTextures::Slots::put_picture(const Picture& p) {
+  if (p.chroma_444 != chroma_444) {  // what the stream really carries wins over what was announced
+    chroma_444 = p.chroma_444;
+    cb = plane(p.chroma_width(), p.chroma_height());
+    cr = plane(p.chroma_width(), p.chroma_height());
+  }
+  put(y, 0, 0, p.width, p.height, GL_RED, GL_UNSIGNED_BYTE, p.y.data());
+  put(cb, 0, 0, p.chroma_width(), p.chroma_height(), GL_RED, GL_UNSIGNED_BYTE, p.cb.data());
+  put(cr, 0, 0, p.chroma_width(), p.chroma_height(), GL_RED, GL_UNSIGNED_BYTE, p.cr.data());
+}
+
+void StreamTextures::Slots::upload(StreamPlayer& player) {
+  for (const auto& rows : player.pages().take_dirty_rows()) {
+    put(pages, 0, rows.first, kTableWidth, rows.count, GL_RED_INTEGER, GL_UNSIGNED_SHORT,
+        player.pages().data() + std::size_t{rows.first} * kTableWidth);
+  }
+  const std::uint32_t per_row = size / kSlotSize;
+  for (const auto& [slot, bytes] : player.take_pixels()) {
+    put(y, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, GL_RGB, GL_UNSIGNED_BYTE,
+        bytes.data());
+  }
+  if (const Picture* picture = player.take_picture(); picture != nullptr) put_picture(*picture);
 }
 
 Result<void> StreamTextures::upload_coarse(const Picture& p) {
@@ -101,12 +118,8 @@ Result<void> StreamTextures::upload_coarse(const Picture& p) {
   return {};
 }
 
-void StreamTextures::upload_slots(StreamPlayer& player) {
+void StreamTextures::upload_coverage(StreamPlayer& player) {
   const std::uint32_t per_row = shape_.slots_per_row();
-  for (const auto& [slot, bytes] : player.take_pixels()) {
-    put(y_, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, GL_RGB, GL_UNSIGNED_BYTE,
-        bytes.data());
-  }
   const auto coverage = player.take_coverage();
   if (!coverage_) return;
   for (const auto& [slot, bytes] : coverage) {
@@ -118,14 +131,8 @@ void StreamTextures::upload_slots(StreamPlayer& player) {
 Result<void> StreamTextures::upload(StreamPlayer& player) {
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glActiveTexture(GL_TEXTURE0);
-  for (const auto& rows : player.pages().take_dirty_rows()) {
-    put(pages_, 0, rows.first, kTableWidth, rows.count, GL_RED_INTEGER, GL_UNSIGNED_SHORT,
-        player.pages().data() + std::size_t{rows.first} * kTableWidth);
-  }
-  upload_slots(player);
-  if (const Picture* picture = player.take_picture(); picture != nullptr) {
-    if (auto ok = upload_picture(*picture); !ok) return ok;
-  }
+  shared_.upload(player);
+  upload_coverage(player);
   if (const Picture* coarse = player.take_coarse(); coarse != nullptr) {
     if (auto ok = upload_coarse(*coarse); !ok) return ok;
   }
@@ -133,12 +140,38 @@ Result<void> StreamTextures::upload(StreamPlayer& player) {
   return {};
 }
 
+Result<void> StreamTextures::upload_view(StreamPlayer& player, const SceneModel& scene) {
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glActiveTexture(GL_TEXTURE0);
+  if (!has_view()) {
+    view_.make(player.pages().rows(), player.shape());
+    const std::uint32_t size = view_.size;
+    if (scene.has_clear()) {
+      through_ = gles::make_texture(GL_RGB8, size, size, GL_LINEAR);
+      const std::vector<std::uint8_t> none(std::size_t{size} * size * 3, 0);
+      put(through_, 0, 0, size, size, GL_RGB, GL_UNSIGNED_BYTE, none.data());
+    }
+  }
+  view_.upload(player);
+  static_cast<void>(player.take_coverage());  // coverage is the shared layer's
+  const std::uint32_t per_row = view_.size / kSlotSize;
+  const auto through = player.take_through();
+  if (through_)
+    for (const auto& [slot, bytes] : through)
+      put(through_, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, GL_RGB,
+          GL_UNSIGNED_BYTE, bytes.data());
+  if (glGetError() != GL_NO_ERROR) return fail("GL: an upload of the private layer failed");
+  return {};
+}
+
 void StreamTextures::bind() const {
-  const gles::Texture* textures[] = {&places_,   &pages_,    &y_,         &cb_,       &cr_,
-                                     &coverage_, &coarse_y_, &coarse_cb_, &coarse_cr_};
-  for (int unit = 0; unit < 9; ++unit) {
-    glActiveTexture(static_cast<GLenum>(GL_TEXTURE0 + unit));
-    glBindTexture(GL_TEXTURE_2D, textures[unit]->id());
+  const gles::Texture* textures[] = {&places_,   &shared_.pages, &shared_.y,  &shared_.cb, &shared_.cr,
+                                     &coverage_, &coarse_y_,     &coarse_cb_, &coarse_cr_, &view_.pages,
+                                     &view_.y,   &view_.cb,      &view_.cr,   &through_};
+  GLenum unit = GL_TEXTURE0;
+  for (const auto* texture : textures) {
+    glActiveTexture(unit++);
+    glBindTexture(GL_TEXTURE_2D, texture->id());
   }
   glActiveTexture(GL_TEXTURE0);
 }

@@ -1,4 +1,4 @@
-// The GL textures behind one stream: slots, pages, patch places, coverage, CoarseTex.
+// The GL textures behind one session: slots and pages of its streams, patch places, coverage, CoarseTex.
 #pragma once
 
 #include "client/core/gles_resources.hpp"
@@ -17,7 +17,12 @@ enum TextureUnit : int {
   kCoverageUnit,
   kCoarseYUnit,
   kCoarseCbUnit,
-  kCoarseCrUnit
+  kCoarseCrUnit,
+  kViewPagesUnit,
+  kViewYUnit,
+  kViewCbUnit,
+  kViewCrUnit,
+  kThroughUnit
 };
 
 /// Needs the GL context current at every call.
@@ -26,20 +31,33 @@ class StreamTextures {
   [[nodiscard]] static Result<StreamTextures> create(const SceneModel& scene, const StreamShape& shape);
   /// Uploads what the player has new.
   [[nodiscard]] Result<void> upload(StreamPlayer& player);
+  /// The same of the private layer; makes its textures at the first call.
+  [[nodiscard]] Result<void> upload_view(StreamPlayer& player, const SceneModel& scene);
+  [[nodiscard]] bool has_view() const { return static_cast<bool>(view_.pages); }
+  [[nodiscard]] std::uint32_t view_size() const { return view_.size; }
+  [[nodiscard]] bool view_444() const { return view_.chroma_444; }
   void bind() const;
   [[nodiscard]] std::uint32_t coarse_width() const { return coarse_width_; }  ///< 0: none yet
   [[nodiscard]] std::uint32_t coarse_height() const { return coarse_height_; }
-  [[nodiscard]] bool chroma_444() const { return chroma_444_; }
+  [[nodiscard]] bool chroma_444() const { return shared_.chroma_444; }
 
  private:
-  void upload_slots(StreamPlayer& player);
-  [[nodiscard]] Result<void> upload_picture(const Picture& picture);
+  // Slots and pages of one stream.
+  struct Slots {
+    std::uint32_t size = 0;
+    bool chroma_444 = false;
+    gles::Texture pages, y, cb, cr;
+    void make(std::uint32_t page_rows, const StreamShape& shape);
+    void upload(StreamPlayer& player);
+    void put_picture(const Picture& picture);
+  };
+  void upload_coverage(StreamPlayer& player);
   [[nodiscard]] Result<void> upload_coarse(const Picture& picture);
 
   StreamShape shape_;
-  bool chroma_444_ = false;
   std::uint32_t coarse_width_ = 0, coarse_height_ = 0, largest_ = 0;
-  gles::Texture places_, pages_, y_, cb_, cr_, coverage_, coarse_y_, coarse_cb_, coarse_cr_;
+  Slots shared_, view_;
+  gles::Texture places_, coverage_, coarse_y_, coarse_cb_, coarse_cr_, through_;
 };
 
 }  // namespace darm::client

@@ -56,7 +56,7 @@ Result<void> parse_size(const std::string& text, std::uint32_t& width, std::uint
 struct Arguments {
   std::string server, camera, setup, size = "1280x720", walkthrough, reference, out, ceiling;
   double until_error = -1, seconds = -1, ceiling_seconds = 0, series_interval = 0, updates_per_second = 10;
-  std::uint32_t phystex = 2048, ceiling_phystex = 8192;
+  std::uint32_t phystex = 2048, ceiling_phystex = 8192, view_phystex = 1024;
   unsigned bench_draw = 0;
   bool lossless = false, no_444 = false, codec_check = false, json = false;
 };
@@ -107,6 +107,7 @@ Result<SessionPlan> make_plan(const Arguments& a) {
   if (plan.seconds < 0) plan.seconds = 10;
   plan.draw_times = draw_times(a, plan.seconds);
   plan.max_phystex = a.phystex;
+  plan.max_view_phystex = a.view_phystex;
   plan.lossless = a.lossless;
   plan.keep_tiles = a.codec_check;
   plan.chroma_444 = !a.no_444;
@@ -123,6 +124,7 @@ Result<Image8> ceiling_picture(const Arguments& a, SessionPlan plan) {
   plan.draw_times.clear();
   plan.lossless = true;
   plan.max_phystex = a.ceiling_phystex;
+  if (plan.max_view_phystex > 0) plan.max_view_phystex = 2048;
   auto session = run_session(plan, nullptr, 0);
   if (!session) return fail("ceiling: " + session.error().message);
   if (!a.ceiling.empty()) {
@@ -219,6 +221,9 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_flag("--lossless", a.lossless, "stream without codec (the server must allow it)");
   app.add_flag("--no-444", a.no_444, "do not offer 4:4:4 chroma");
   app.add_option("--phystex", a.phystex, "largest PhysTex to accept, pixels")->capture_default_str();
+  app.add_option("--view-phystex", a.view_phystex,
+                 "largest PhysTex of the private layer to accept, pixels; 0: only light that does not depend on the eye")
+      ->capture_default_str();
   app.add_option("--updates-per-second", a.updates_per_second, "cameras sent, also when still")
       ->capture_default_str()
       ->check(number(0.1, 240));

@@ -30,6 +30,7 @@ class Run {
   Result<void> handle(const Received& message);
   Result<void> begin_scene(const wire::SceneManifest& manifest);
   Result<void> handle_frame(const Received& message);
+  Result<void> handle_view_frame(const Received& message);
   void note_answer(std::uint64_t answers, const wire::Stamps& stamps, std::int64_t at_us);
   Result<void> draw_if_due();
   Result<void> draw();
@@ -42,9 +43,10 @@ class Run {
   SessionReport report_;
   std::unordered_map<std::uint16_t, std::string> kept_pixels_;  // newest lossless bytes of each slot
   std::unique_ptr<Connection> connection_;
-  StreamShape shape_;
+  StreamShape shape_, view_shape_;
   std::optional<SceneModel> scene_;
   std::optional<StreamPlayer> player_;
+  std::optional<StreamPlayer> view_player_;  // of the private layer, if there is one
   std::unique_ptr<GlesRenderer> renderer_;
   std::int64_t start_us_ = 0, next_send_us_ = 0, first_image_us_ = 0, last_key_request_us_ = 0;
   std::int64_t decode_us_ = 0, draw_us_ = 0;
@@ -75,6 +77,11 @@ Result<void> Run::begin_scene(const wire::SceneManifest& manifest) {
   auto player = StreamPlayer::create(*scene_, shape_);
   if (!player) return std::unexpected(player.error());
   player_.emplace(std::move(*player));
+  if (view_shape_.phystex_size > 0) {
+    auto own = StreamPlayer::create(*scene_, view_shape_);
+    if (!own) return std::unexpected(own.error());
+    view_player_.emplace(std::move(*own));
+  }
   auto renderer = GlesRenderer::create(*scene_, shape_);
   if (!renderer) return std::unexpected(renderer.error());
   renderer_ = std::move(*renderer);
@@ -129,6 +136,18 @@ Result<void> Run::handle_frame(const Received& message) {
   return {};
 }
 
+Result<void> Run::handle_view_frame(const Received& message) {
+  if (!view_player_) return fail("server: a frame of a private layer that was not agreed on");
+  report_.view_bytes += message.bytes;
+  const auto fate = view_player_->apply(message.envelope.view_frame(), *scene_);
+  if (!fate) return std::unexpected(fate.error());
+  if (*fate == FrameFate::kApplied) {
+    ++report_.view_frames;
+    picture_new_ = true;
+  }
+  return {};
+}
+
 Result<void> Run::handle(const Received& message) {
   bytes_handled_ = message.bytes_total;
   const auto& e = message.envelope;
@@ -144,6 +163,8 @@ Result<void> Run::handle(const Received& message) {
       return player_ ? player_->apply(e.coarse(), *scene_) : fail("server: CoarseTex before the manifest");
     case wire::Envelope::kFrame:
       return handle_frame(message);
+    case wire::Envelope::kViewFrame:
+      return handle_view_frame(message);
     case wire::Envelope::kNoChange:
       ++report_.no_changes;
       report_.stream_bytes += message.bytes;
@@ -158,10 +179,13 @@ Result<void> Run::handle(const Received& message) {
 
 Result<void> Run::send_due() {
   const std::int64_t now = now_us();
-  if (player_ && player_->key_frame_wanted() && player_->frames_lost() > 0 &&
-      now - last_key_request_us_ > kKeyRequestEveryUs) {
+  const auto lost = [](const auto& player) {
+    return player && player->key_frame_wanted() && player->frames_lost() > 0;
+  };
+  if ((lost(player_) || lost(view_player_)) && now - last_key_request_us_ > kKeyRequestEveryUs) {
     wire::Feedback feedback;
-    feedback.set_key_frame_wanted(true);
+    feedback.set_key_frame_wanted(lost(player_));
+    feedback.set_view_key_frame_wanted(lost(view_player_));
     feedback.set_frame_shown(player_->frame_shown());
     feedback.set_frames_lost(player_->frames_lost());
     feedback.set_client_time_us(now);
@@ -189,6 +213,9 @@ Result<void> Run::send_due() {
 
 Result<void> Run::draw() {
   if (auto ok = renderer_->synchronise(*scene_, *player_); !ok) return ok;
+  if (view_player_) {
+    if (auto ok = renderer_->synchronise_view(*scene_, *view_player_); !ok) return ok;
+  }
   const std::int64_t before = now_us();
   if (auto ok = renderer_->draw(*scene_, view_now()); !ok) return ok;
   renderer_->finish();
@@ -266,6 +293,10 @@ Result<void> Run::finish(unsigned bench_draws) {
   report_.bytes = connection_->bytes_received();
   report_.sent_bytes = connection_->bytes_sent();
   report_.frames_lost = player_->frames_lost();
+  if (view_player_) {
+    report_.view_frames_lost = view_player_->frames_lost();
+    report_.view_slots_used = view_player_->pages().resident();
+  }
   report_.triangles = scene_->triangles();
   auto picture = renderer_->read_picture();
   if (!picture) return std::unexpected(picture.error());
@@ -294,6 +325,7 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   options.name = "darm-probe";
   options.view = view_now();
   options.max_phystex = plan_.max_phystex;
+  options.max_view_phystex = plan_.max_view_phystex;
   options.chroma_444 = plan_.chroma_444;
   options.lossless = plan_.lossless;
   auto connection = Connection::open(options);
@@ -303,6 +335,8 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   if (plan_.lossless && !welcome.lossless())
     return fail("server: does not offer lossless streams; its configuration must set stream.allow_lossless");
   shape_ = {welcome.phystex_size(), welcome.chroma_444(), welcome.lossless()};
+  view_shape_ = {welcome.view_phystex(), welcome.chroma_444(), welcome.lossless()};
+  report_.view_phystex_size = welcome.view_phystex();
   report_.server = welcome.server();
   report_.udp = connection_->uses_udp();
   report_.phystex_size = welcome.phystex_size();

@@ -71,6 +71,11 @@ std::string to_json(const Outcome& o) {
   j["device"] = s.device;
   j["server"] = s.server;
   j["phystex_size"] = s.phystex_size;
+  j["view_phystex_size"] = s.view_phystex_size;
+  j["view_slots_used"] = s.view_slots_used;
+  j["view_frames"] = s.view_frames;
+  j["view_frames_lost"] = s.view_frames_lost;
+  j["view_bytes"] = s.view_bytes;
   j["udp"] = s.udp;
   Json latency = Json::object();
   for (const auto& [stage, values] : s.latency_ms)
@@ -99,6 +104,10 @@ std::string to_text(const Outcome& o) {
                       100 * share(s.residency.coarser, s.residency.samples),
                       100 * share(s.residency.coarse_tex, s.residency.samples),
                       100 * share(s.residency.background, s.residency.samples));
+  if (s.view_phystex_size > 0)
+    text += fmt::format("private layer: {} slots of {}x{}, {} frames, {:.2f} MB\n", s.view_slots_used,
+                        s.view_phystex_size, s.view_phystex_size, s.view_frames,
+                        static_cast<double>(s.view_bytes) / 1e6);
   for (const auto& [stage, values] : s.latency_ms) {
     text +=
         fmt::format("{:>12}: p50 {:.1f} ms, p99 {:.1f} ms\n", stage, percentile(values, 0.5), percentile(values, 0.99));

@@ -111,6 +111,7 @@ void read_work(TableReader& root, Config& config) {
   root.table("stream", [&](TableReader& reader) {
     reader.number("updates_per_second", config.stream.updates_per_second, 0.1, 120);
     reader.one_of("phystex", config.stream.phystex, {1024, 2048, 4096});
+    reader.one_of("view_phystex", config.stream.view_phystex, {0, 512, 1024});
     reader.integer("max_writes", config.stream.max_writes, 1, 16384);
     reader.integer("crf", config.stream.crf, 0, 51);
     reader.choice("preset", config.stream.preset,

@@ -61,6 +61,7 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.accuracy.filter_samples, b.accuracy.filter_samples);
   EXPECT_EQ(a.stream.updates_per_second, b.stream.updates_per_second);
   EXPECT_EQ(a.stream.phystex, b.stream.phystex);
+  EXPECT_EQ(a.stream.view_phystex, b.stream.view_phystex);
   EXPECT_EQ(a.stream.max_writes, b.stream.max_writes);
   EXPECT_EQ(a.stream.crf, b.stream.crf);
   EXPECT_EQ(a.stream.preset, b.stream.preset);

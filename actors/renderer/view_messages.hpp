@@ -1,0 +1,45 @@
+// The view renderer's inbox. Plain values only: peers may include this file and nothing else of the room.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "actors/runtime/overflow.hpp"
+#include "actors/types/ids.hpp"
+#include "actors/types/slot_mask.hpp"
+#include "actors/types/tile_id.hpp"
+
+namespace darm::renderer {
+
+/// A private tile of a session. `weight`: share of the session's picture that it serves, times what it is worth there.
+struct ViewTileRequest {
+  TileId tile;
+  float weight = 0;
+  SlotMask mask;  ///< texels that are read
+};
+
+/// All private tiles of a session and the eye they are for, replacing what was before. None: the session is forgotten.
+struct ShadeView {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
+  SessionId session{};
+  glm::vec3 eye{0.0f};  ///< recentred world space, finite
+  std::shared_ptr<const std::vector<ViewTileRequest>> work;
+
+  ShadeView(SessionId id, const glm::vec3& position, std::shared_ptr<const std::vector<ViewTileRequest>> tiles)
+      : session(id), eye(position), work(std::move(tiles)) {}
+  [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
+};
+
+/// A slice of view shading is done on the pool. The view renderer sends it to itself.
+struct ViewSliceFinished {
+  static constexpr auto kOverflow = runtime::Overflow::kReject;
+  std::uint64_t batch = 0;
+  explicit ViewSliceFinished(std::uint64_t number) : batch(number) {}
+};
+
+using ViewInbox = std::variant<ShadeView, ViewSliceFinished>;
+
+}  // namespace darm::renderer

@@ -1,0 +1,35 @@
+// How much of what each instance shows depends on the eye: what the private layer of a session is worth there.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "actors/scene/scene.hpp"
+
+namespace darm::scene {
+
+/// View-dependent light of one material.
+struct ViewMaterial {
+  /// Expected display error (0..1) of leaving it out; 0: not worth a private tile.
+  float weight = 0;
+  /// Levels under the sharp one at which its light is kept: what a rough lobe reflects is smooth.
+  std::uint8_t coarser = 0;
+};
+
+struct ViewMaterialOptions {
+  float calls = 0.05f;  ///< a scene with a material of at least this weight has a private layer
+  float joins = 0.01f;  ///< and then everything of at least this weight is in it
+};
+
+/// Reads a material and a grid of points of its textures. The weight of a point: what a grey surrounding of display
+/// value about .6 (linear 0.3) would add to its diffuse light, as a difference of display values, times 1 to 3 for lobes
+/// so narrow that they show what they reflect. Of the material: RMS over the points.
+[[nodiscard]] ViewMaterial view_material(const Scene& scene, const Material& material);
+
+/// One per instance. All weights are 0 if nothing in the scene calls for a private layer.
+[[nodiscard]] std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialOptions& options = {});
+
+/// True if some instance has weight.
+[[nodiscard]] bool calls_for_view_layer(const std::vector<ViewMaterial>& materials);
+
+}  // namespace darm::scene

@@ -1,0 +1,66 @@
+// The private layer of one session as the scheduler knows it: what its eye sees of light that depends on it, which tiles
+// get its slots, and its stream. Pure.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "actors/renderer/view_messages.hpp"
+#include "actors/tile_scheduler/image_store.hpp"
+#include "actors/tile_scheduler/private_set.hpp"
+#include "actors/tile_scheduler/slot_allocation.hpp"
+#include "actors/tile_scheduler/stream_state.hpp"
+
+namespace darm::tile_scheduler {
+
+struct PrivateLayerOptions {
+  Microseconds keep_previous = 500'000;  ///< how long what the pose before saw lives on
+  float previous_weight = 0.25f;
+  /// Shares of its worth that a chain loses 0..3 levels coarser than it begins, and when it has nothing.
+  ChainLoss loss{0.0f, 0.2f, 0.4f, 0.6f, 1.0f};
+};
+
+class PrivateLayer {
+ public:
+  PrivateLayer(const StreamFormat& format, const StreamOptions& stream, const PrivateLayerOptions& options);
+
+  /// The camera moved: what follows belongs to a new pose.
+  void start_pose(Microseconds now);
+  void add(const PrivateSet& samples) { current_.merge(samples); }
+  /// Forgets the pose before when its time is over. True if it did.
+  bool expire(Microseconds now);
+
+  /// Chooses the tiles of the slots anew, and the requests that shade them.
+  void reallocate(const AllocationOptions& options, int coarse_level);
+  [[nodiscard]] const std::shared_ptr<const std::vector<renderer::ViewTileRequest>>& requests() const {
+    return requests_;
+  }
+  /// New pictures; of tiles that are no longer wanted they are ignored.
+  void put(const std::vector<ShadedTile>& tiles);
+
+  /// Nothing to send and nothing sent yet: no need of an encoder.
+  [[nodiscard]] bool idle() const { return stream_.last_frame() == 0 && granted_.empty(); }
+  [[nodiscard]] StreamState& stream() { return stream_; }
+  [[nodiscard]] const StreamState& stream() const { return stream_; }
+  [[nodiscard]] StreamStep step(Microseconds now);
+  [[nodiscard]] std::size_t target_size() const { return target_.tiles.size(); }
+
+ private:
+  void grant();
+
+  PrivateLayerOptions options_;
+  AllocationOptions allocation_;
+  StreamState stream_;
+  ImageStore images_;
+  PrivateSet current_;
+  PrivateSet previous_;
+  Microseconds moved_at_ = 0;
+  int coarse_level_ = 0;
+  std::vector<WeightedChain> chains_;
+  std::vector<ChainLoss> losses_;
+  Allocation target_;
+  std::vector<TileId> granted_;
+  std::shared_ptr<const std::vector<renderer::ViewTileRequest>> requests_;
+};
+
+}  // namespace darm::tile_scheduler
