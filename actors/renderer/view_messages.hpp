@@ -14,10 +14,10 @@
 
 namespace darm::renderer {
 
-/// A private tile of a session. `weight`: share of the session's picture that it serves, times what it is worth there.
+/// A private tile of a session. `share`: of the session's picture that it serves, 0..1.
 struct ViewTileRequest {
   TileId tile;
-  float weight = 0;
+  float share = 0;
   SlotMask mask;  ///< texels that are read
 };
 

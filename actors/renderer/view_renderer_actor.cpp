@@ -63,8 +63,8 @@ void ViewRendererActor::take(const ShadeView& wish) {
     }
     Held held;
     if (const auto old = tiles.find(request.tile); old != tiles.end()) held = old->second;
-    if (!held.tile) held.tile = std::make_shared<ViewTile>();
-    held.weight = request.weight;
+    if (!held.tile) held.tile = std::make_shared<ViewTile>(parts_->options.tile.exposure);
+    held.share = request.share;
     held.tile->want(request.mask);
     held.tile->see_from(wish.eye, parts_->options.tile);
     tiles_held_ += kept.emplace(request.tile, std::move(held)).second ? 1 : 0;
@@ -72,7 +72,7 @@ void ViewRendererActor::take(const ShadeView& wish) {
   tiles = std::move(kept);
 }
 
-// The first pass over what is new first, by weight; then where weight times the fall of squared error per sample is most.
+// The first pass over what is new first, by share; then where share times the fall of squared error per sample is most.
 void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, Batch& batch) const {
   struct Candidate {
     double gain;
@@ -83,7 +83,7 @@ void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, B
   for (const auto& [tile, held] : view.tiles) {
     if (held.tile->finished(parts_->options.tile)) continue;
     const double n = double{held.tile->least()};
-    const double gain = n < 1 ? 1e6 * (1.0 + double{held.weight}) : double{held.weight} / (n * (n + 1));
+    const double gain = n < 1 ? 1e9 * (1.0 + double{held.share}) : double{held.share * held.tile->display_variance()} / (n * (n + 1));
     candidates.push_back({gain / std::max(1, held.tile->wanted()), tile, &held});
   }
   std::sort(candidates.begin(), candidates.end(),
@@ -144,7 +144,7 @@ void ViewRendererActor::run(const ViewRendererParts& parts, Job& job) {
     const auto surface = parts.surfaces->tile(job.tile);
     if (!surface) return;
     job.samples = job.state->shade(*surface, job.passes);
-    if (job.state->picture_due(parts.options.tile)) job.picture = job.state->draw(*surface, parts.options.tile);
+    if (job.state->picture_due(parts.options.tile)) job.picture = job.state->draw(*surface);
   } catch (const std::exception&) {
     job.failed = true;
   }

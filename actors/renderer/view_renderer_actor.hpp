@@ -42,7 +42,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
  private:
   struct Held {
     std::shared_ptr<ViewTile> tile;
-    float weight = 0;
+    float share = 0;
   };
   struct View {
     std::unordered_map<TileId, Held> tiles;

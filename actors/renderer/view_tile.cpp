@@ -14,6 +14,8 @@ namespace {
 
 constexpr float kTamedUpTo = 256;       // samples; see tamed()
 constexpr float kTamedFloor = 0.02f;    // linear display value below which nothing is an outlier
+constexpr float kPedestal = 0.01f;      // linear display value
+constexpr float kWideLobe = 0.2f;         // GGX alpha from which neighbouring texels reflect much the same
 constexpr float kFadeOfForgotten = 0.5f;  // a picture counts so much less after the eye moved a little
 
 }  // namespace
@@ -27,15 +29,26 @@ void ViewTile::want(const SlotMask& mask) {
 void ViewTile::survey() {
   least_ = 0;
   double sum = 0;
+  double variance = 0;
   live_ = 0;
   for (int at = 0; at < kSlotTexels; ++at) {
     if (!mask_.test(at) || dead_.test(at)) continue;
-    const float n = texels_[static_cast<std::size_t>(at)].count;
+    const auto& texel = texels_[static_cast<std::size_t>(at)];
+    const float n = texel.count;
+    variance += n >= 2 ? double{variance_of(texel)} : 1.0;
     least_ = live_ == 0 ? n : std::min(least_, n);
     sum += double{n};
     ++live_;
   }
   mean_ = live_ > 0 ? static_cast<float>(sum / live_) : 0.0f;
+  display_variance_ = live_ > 0 ? static_cast<float>(variance / live_) : 1.0f;
+}
+
+// Of one sample, in display values. What lies under it in the shared layer is not known here: a little.
+float ViewTile::variance_of(const Texel& texel) const {
+  const float linear = std::max(luminance(texel.mean) * exposure_, 0.0f) + kPedestal;
+  const float slope = srgb_slope(srgb_code(linear)) * exposure_;
+  return texel.m2 / std::max(texel.count - 1.0f, 1.0f) * slope * slope;
 }
 
 void ViewTile::see_from(const glm::vec3& eye, const ViewTileOptions& options) {
@@ -125,34 +138,51 @@ glm::vec3 ViewTile::tamed(int at) const {
   return own > limit && most > 0 ? texel.mean * (limit / own) : texel.mean;
 }
 
-float ViewTile::error_of(const TileImage& image, const ViewTileOptions& options) const {
+// A wide lobe reflects smoothly: while samples are few the picture is of the mean around each texel. Gone with 256.
+int ViewTile::filter_radius() const {
+  if (alpha_ < kWideLobe) return 0;
+  return mean_ < 64 ? 2 : mean_ < 256 ? 1 : 0;
+}
+
+// Of the mean, in display values: RMS over the wanted texels. Noise only.
+float ViewTile::standard_error() const {
   double squares = 0;
   int texels = 0;
   for (int at = 0; at < kSlotTexels; ++at) {
     if (!mask_.test(at) || dead_.test(at)) continue;
     const auto& t = texels_[static_cast<std::size_t>(at)];
     ++texels;
-    if (t.count < 2) {
-      squares += 0.25 * 0.25;
-      continue;
-    }
-    const std::uint8_t* rgb = &image.rgb[static_cast<std::size_t>(at) * 3];
-    const auto code = static_cast<std::uint8_t>(std::lround(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]));
-    const double variance = double{t.m2} / (double{t.count} * std::max(1.0, double{t.count} - 1));
-    const double e = double{srgb_slope(code)} * double{options.exposure} * std::sqrt(std::max(variance, 0.0));
-    squares += std::min(e * e, 0.25);
+    squares += t.count < 2 ? 0.0625 : std::min(double{variance_of(t)} / double{t.count}, 0.25);
   }
   return texels > 0 ? static_cast<float>(std::sqrt(squares / texels)) : 0.0f;
 }
 
-TilePicture ViewTile::draw(ViewSurface& surface, const ViewTileOptions& options) {
+TilePicture ViewTile::draw(ViewSurface& surface) {
   SlotFill<3> fill;
+  std::vector<glm::vec3> light(kSlotTexels, glm::vec3(0.0f));
   for (int at = 0; at < kSlotTexels; ++at) {
     fill.patch[static_cast<std::size_t>(at)] = surface.patch(at);
     const auto& texel = texels_[static_cast<std::size_t>(at)];
     if (!texel.shown || dead_.test(at)) continue;
-    const glm::vec3 light = (luminance(texel.mean) * options.exposure > kTamedFloor ? tamed(at) : texel.mean);
-    const glm::vec3 shown = glm::max(light, glm::vec3(0.0f)) * options.exposure;
+    light[static_cast<std::size_t>(at)] =
+        luminance(texel.mean) * exposure_ > kTamedFloor ? tamed(at) : texel.mean;
+  }
+  const int radius = filter_radius();
+  for (int at = 0; at < kSlotTexels; ++at) {
+    if (!texels_[static_cast<std::size_t>(at)].shown || dead_.test(at)) continue;
+    glm::vec3 sum(0.0f);
+    float weight = 0;
+    const int x = at % kSlotSize;
+    const int y = at / kSlotSize;
+    for (int j = std::max(y - radius, 0); j <= std::min(y + radius, kSlotSize - 1); ++j)
+      for (int i = std::max(x - radius, 0); i <= std::min(x + radius, kSlotSize - 1); ++i) {
+        const auto other = static_cast<std::size_t>(j * kSlotSize + i);
+        if (fill.patch[other] != fill.patch[static_cast<std::size_t>(at)] || !texels_[other].shown) continue;
+        const float w = std::max(texels_[other].count, 0.5f);
+        sum += light[other] * w;
+        weight += w;
+      }
+    const glm::vec3 shown = sum * (exposure_ / std::max(weight, 1e-6f));
     fill.set(at, {shown.x, shown.y, shown.z});
   }
   // Other patches in the tile may have nothing private: filled across, they would get light that is not theirs.
@@ -165,7 +195,7 @@ TilePicture ViewTile::draw(ViewSurface& surface, const ViewTileOptions& options)
   through_known_ = true;
   image->through = through_;
   TilePicture picture;
-  picture.error = error_ = error_of(*image, options);
+  picture.error = error_ = standard_error();
   picture.samples = pictured_ = mean_;
   picture.image = std::move(image);
   return picture;

@@ -25,7 +25,7 @@ struct ViewTileOptions {
 /// 24 KB. One thread at a time.
 class ViewTile {
  public:
-  ViewTile() : texels_(kSlotTexels) {}
+  explicit ViewTile(float exposure) : texels_(kSlotTexels), exposure_(exposure) {}
 
   /// Texels that are read now. What was shaded before keeps its light.
   void want(const SlotMask& mask);
@@ -36,6 +36,8 @@ class ViewTile {
   /// Samples of the wanted texel with fewest; and how many texels are wanted.
   [[nodiscard]] float least() const { return least_; }
   [[nodiscard]] int wanted() const { return live_; }
+  /// Variance of one sample in display values, averaged over the wanted texels; as large as can be until it is known.
+  [[nodiscard]] float display_variance() const { return display_variance_; }
   [[nodiscard]] bool finished(const ViewTileOptions& options) const;
 
   /// Takes up to `passes` samples of each wanted texel that is not ahead of the others. Returns how many.
@@ -44,7 +46,7 @@ class ViewTile {
   /// All wanted texels have a sample for this eye, and the last picture is of another eye, of other texels or of half
   /// the samples.
   [[nodiscard]] bool picture_due(const ViewTileOptions& options) const;
-  [[nodiscard]] TilePicture draw(ViewSurface& surface, const ViewTileOptions& options);
+  [[nodiscard]] TilePicture draw(ViewSurface& surface);
   /// The picture did not reach anybody.
   void forget_picture() { pictured_ = -1; }
 
@@ -58,8 +60,10 @@ class ViewTile {
   };
   void add(Texel& texel, const ViewDependentLight& light);
   void survey();
+  [[nodiscard]] float variance_of(const Texel& texel) const;
   [[nodiscard]] glm::vec3 tamed(int at) const;
-  [[nodiscard]] float error_of(const TileImage& image, const ViewTileOptions& options) const;
+  [[nodiscard]] int filter_radius() const;
+  [[nodiscard]] float standard_error() const;
 
   std::vector<Texel> texels_;
   SlotMask mask_;
@@ -72,7 +76,9 @@ class ViewTile {
   float distance_ = 0;          // nearest point seen to the eye; 0: none
   float least_ = 0;
   float mean_ = 0;
+  float display_variance_ = 1;
   int live_ = 0;
+  float exposure_ = 1;
   float pictured_ = -1;  // mean samples of the last picture; -1: none
   float error_ = 1;
 };

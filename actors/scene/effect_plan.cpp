@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "actors/scene/view_materials.hpp"
+
 namespace darm::scene {
 namespace {
 
@@ -120,6 +122,10 @@ EffectPlan plan_effects(const Scene& scene) {
       survey.lights([&](const Light& l) { return l.object < scene.objects.size() && scene.objects[l.object].dynamic; });
   plan.out.moving_lights = plan.add("moving lights", moving, "light on a movable node", "lights on movable nodes");
   plan.out.moving_bodies = plan.add("moving bodies", survey.moving_bodies(), "movable body", "movable bodies");
+  const auto view = view_materials(scene);
+  const auto shown = static_cast<std::size_t>(std::ranges::count_if(view, [](const auto& m) { return m.weight > 0; }));
+  plan.out.view_layer = plan.add("private layer", shown, "instance whose light depends on the eye",
+                                 "instances whose light depends on the eye enough");
   return std::move(plan.out);
 }
 

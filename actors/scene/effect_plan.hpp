@@ -31,6 +31,7 @@ struct EffectPlan {
   bool textures = false;
   bool moving_lights = false;
   bool moving_bodies = false;
+  bool view_layer = false;      ///< enough of some surface's light depends on the eye (view_materials.hpp)
   std::vector<Effect> effects;  ///< the same, in this order, with reasons
 };
 

@@ -6,8 +6,9 @@
 namespace darm::tile_scheduler {
 namespace {
 
-// Chains of both poses, each once, with their worth as a share of the picture.
-std::vector<WeightedChain> join(const PrivateSet& current, const PrivateSet& previous, float previous_weight) {
+// Chains of both poses, each once, with their worth as a share of the picture, and that share itself.
+std::vector<WeightedChain> join(const PrivateSet& current, const PrivateSet& previous, float previous_weight,
+                                std::vector<float>& shares) {
   std::vector<WeightedChain> out;
   ChainIndex seen;
   const auto append = [&](const PrivateSet& set, float weight) {
@@ -15,8 +16,12 @@ std::vector<WeightedChain> join(const PrivateSet& current, const PrivateSet& pre
     const auto per_sample = static_cast<float>(double{weight} / set.samples());
     for (std::size_t i = 0; i < set.chains().size(); ++i) {
       const auto number = seen.insert(set.chains()[i]);
-      if (number == out.size()) out.push_back({set.chains()[i], 0.0f});
+      if (number == out.size()) {
+        out.push_back({set.chains()[i], 0.0f});
+        shares.push_back(0.0f);
+      }
       out[number].weight += set.worths()[i] * per_sample;
+      shares[number] += set.counts()[i] * per_sample;
     }
   };
   append(current, 1.0f);
@@ -49,7 +54,8 @@ bool PrivateLayer::expire(Microseconds now) {
 void PrivateLayer::reallocate(const AllocationOptions& options, int coarse_level) {
   allocation_ = options;
   coarse_level_ = coarse_level;
-  chains_ = join(current_, previous_, options_.previous_weight);
+  chain_shares_.clear();
+  chains_ = join(current_, previous_, options_.previous_weight, chain_shares_);
   losses_.assign(chains_.size(), options_.loss);
   AllocationRequest request;
   const auto residents = stream_.table().residents();
@@ -60,12 +66,13 @@ void PrivateLayer::reallocate(const AllocationOptions& options, int coarse_level
   request.coarse_level = coarse_level;
   request.exchange = false;
   target_ = allocate_slots(request, options);
+  const auto share = shares();
   auto requests = std::make_shared<std::vector<renderer::ViewTileRequest>>();
   requests->reserve(target_.tiles.size());
   for (std::size_t i = 0; i < target_.tiles.size(); ++i) {
     renderer::ViewTileRequest r;
     r.tile = target_.tiles[i];
-    r.weight = target_.weights[i];
+    r.share = share[i];
     for (const auto* set : {&current_, &previous_})
       if (const auto* mask = set->find(r.tile)) r.mask |= *mask;
     requests->push_back(r);
@@ -73,6 +80,20 @@ void PrivateLayer::reallocate(const AllocationOptions& options, int coarse_level
   }
   requests_ = std::move(requests);
   grant();
+}
+
+// Share of the picture that each target tile serves.
+std::vector<float> PrivateLayer::shares() const {
+  TileIndex index;
+  for (const auto tile : target_.tiles) index.insert(tile);
+  std::vector<float> out(target_.tiles.size(), 0.0f);
+  for (std::size_t c = 0; c < chains_.size(); ++c) {
+    const auto position = target_.served[c];
+    if (position >= kChainLength) continue;
+    const auto number = index.find(chains_[c].chain.tiles[position]);
+    if (number != TileIndex::kAbsent) out[number] += chain_shares_[c];
+  }
+  return out;
 }
 
 void PrivateLayer::grant() {

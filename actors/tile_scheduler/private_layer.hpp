@@ -47,6 +47,7 @@ class PrivateLayer {
 
  private:
   void grant();
+  [[nodiscard]] std::vector<float> shares() const;
 
   PrivateLayerOptions options_;
   AllocationOptions allocation_;
@@ -56,7 +57,8 @@ class PrivateLayer {
   PrivateSet previous_;
   Microseconds moved_at_ = 0;
   int coarse_level_ = 0;
-  std::vector<WeightedChain> chains_;
+  std::vector<WeightedChain> chains_;  // weights: worth as a share of the picture
+  std::vector<float> chain_shares_;    // share of the picture, parallel
   std::vector<ChainLoss> losses_;
   Allocation target_;
   std::vector<TileId> granted_;

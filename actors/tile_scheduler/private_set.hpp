@@ -32,15 +32,18 @@ class PrivateSet {
   [[nodiscard]] double samples() const { return samples_; }
   [[nodiscard]] const std::vector<Chain>& chains() const { return chains_.keys(); }
   [[nodiscard]] std::span<const float> worths() const { return worths_; }  ///< sums of weights, parallel to chains()
+  [[nodiscard]] std::span<const float> counts() const { return counts_; }  ///< samples, parallel to chains()
   /// Texels read of a tile, at whatever level it serves; null if none.
   [[nodiscard]] const SlotMask* find(TileId tile) const;
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
 
  private:
   SlotMask* mask_of(TileId tile);
+  void count(const Chain& chain, float worth, float samples);
 
   ChainIndex chains_;
   std::vector<float> worths_;
+  std::vector<float> counts_;
   TileIndex tiles_;
   std::vector<SlotMask> masks_;
   double samples_ = 0;

@@ -210,7 +210,10 @@ void main() {
 #endif
 #else
 #ifdef VIEW
-  vec3 sum = min(to_linear(light) * factor + own, vec3(1.0));
+  vec3 shared_light = to_linear(light);
+  // What is as bright as the display can be was cut there, and how much is not known: it is not dimmed.
+  shared_light *= mix(vec3(factor), vec3(max(factor, 1.0)), smoothstep(0.9, 1.0, shared_light));
+  vec3 sum = min(shared_light + own, vec3(1.0));
 #ifdef LINEAR
   o_colour = vec4(sum, coverage);
 #else

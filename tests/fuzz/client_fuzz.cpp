@@ -19,12 +19,13 @@ constexpr std::size_t kMaxInput = 1 << 20;
 
 struct Client {
   std::optional<SceneModel> scene;
-  std::optional<StreamPlayer> player;
-  StreamShape shape;
+  std::optional<StreamPlayer> player, view_player;
+  StreamShape shape, view_shape;
 
   void welcome(const wire::Welcome& w) {
     // Real clients take what they asked for; smaller sizes keep each run short.
     shape = {w.phystex_size() % 512, w.chroma_444(), w.lossless()};
+    view_shape = {w.view_phystex() % 512, w.chroma_444(), w.lossless()};
   }
   void manifest(const wire::SceneManifest& m) {
     SceneLimits limits;
@@ -35,11 +36,19 @@ struct Client {
     player.reset();
     auto stream = StreamPlayer::create(*scene, shape);
     if (stream) player.emplace(std::move(*stream));
+    view_player.reset();
+    auto view_stream = StreamPlayer::create(*scene, view_shape);
+    if (view_stream) view_player.emplace(std::move(*view_stream));
   }
   void take(const wire::Envelope& e) {
     if (e.has_welcome()) welcome(e.welcome());
     if (e.has_manifest()) manifest(e.manifest());
     if (e.has_geometry() && scene) (void)scene->add_chunk(e.geometry());
+    if (view_player && e.has_view_frame()) {
+      (void)view_player->apply(e.view_frame(), *scene);
+      (void)view_player->pages().take_dirty_rows();
+      (void)view_player->take_through();
+    }
     if (!player) return;
     if (e.has_frame()) (void)player->apply(e.frame(), *scene);
     if (e.has_coarse()) (void)player->apply(e.coarse(), *scene);
@@ -54,7 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   proto::FrameReader frames(kMaxInput);
   frames.feed(std::span(data, size));
   Client client;
-  client.shape.phystex_size = 64;
+  client.shape.phystex_size = client.view_shape.phystex_size = 64;
   wire::Envelope envelope;
   for (;;) {
     const auto got = frames.next(envelope);

@@ -27,7 +27,7 @@ TEST(EffectPlan, NeedsNothingThatNoInstanceShows) {
   const EffectPlan plan = plan_effects(s);
   EXPECT_FALSE(plan.alpha_test);
   EXPECT_EQ(effect(plan, "alpha test").reason, "no materials with alpha MASK");
-  EXPECT_EQ(plan.effects.size(), 14u);
+  EXPECT_EQ(plan.effects.size(), 15u);
 }
 
 TEST(EffectPlan, GivesReasons) {

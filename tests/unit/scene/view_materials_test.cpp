@@ -1,0 +1,79 @@
+// Which materials are worth a private layer, and how fine.
+#include "actors/scene/view_materials.hpp"
+
+#include <gtest/gtest.h>
+
+namespace darm::scene {
+namespace {
+
+Material plaster(float roughness) {
+  Material m;
+  m.base_color = glm::vec4(0.7f, 0.7f, 0.7f, 1.0f);
+  m.metallic = 0;
+  m.roughness = roughness;
+  return m;
+}
+
+Material mirror() {
+  Material m;
+  m.metallic = 1;
+  m.roughness = 0.02f;
+  return m;
+}
+
+Scene scene_of(const std::vector<Material>& materials) {
+  Scene s;
+  s.materials = materials;
+  s.objects.emplace_back();
+  for (std::uint32_t i = 0; i < materials.size(); ++i) {
+    s.meshes.emplace_back().material = i;
+    s.instances.push_back({i, glm::mat4(1.0f), false, 0});
+  }
+  return s;
+}
+
+TEST(ViewMaterials, a_scene_of_matte_surfaces_has_no_private_layer) {
+  Material matte = plaster(1);
+  matte.ior = 1;
+  Material unlit = mirror();
+  unlit.unlit = true;
+  const auto weights = view_materials(scene_of({plaster(0.9f), plaster(1.0f), matte, unlit}));
+  EXPECT_FALSE(calls_for_view_layer(weights));
+  for (const auto& m : weights) EXPECT_EQ(m.weight, 0.0f);
+}
+
+TEST(ViewMaterials, beside_a_mirror_rough_surfaces_join_at_coarse_levels) {
+  Material matte = plaster(1);
+  matte.ior = 1;
+  const auto weights = view_materials(scene_of({plaster(0.9f), mirror(), matte}));
+  ASSERT_TRUE(calls_for_view_layer(weights));
+  EXPECT_GT(weights[1].weight, 5 * weights[0].weight);
+  EXPECT_EQ(weights[1].coarser, 0);
+  EXPECT_GT(weights[0].weight, 0.0f);
+  EXPECT_EQ(weights[0].coarser, 3);
+  EXPECT_EQ(weights[2].weight, 0.0f) << "nothing is reflected without a boundary";
+}
+
+TEST(ViewMaterials, polish_metal_and_glass_call_for_it) {
+  Material pane = plaster(0);
+  pane.transmission = 1;
+  Material ball = pane;
+  ball.thickness = 0.1f;
+  Material brass = mirror();
+  brass.roughness = 0.35f;
+  for (const auto& m : {plaster(0.05f), pane, ball, brass}) EXPECT_TRUE(calls_for_view_layer(view_materials(scene_of({m}))));
+}
+
+TEST(ViewMaterials, textures_are_read_not_guessed) {
+  Scene s = scene_of({plaster(1)});
+  s.materials[0].metallic = 1;  // glTF's default factor, undone by the texture
+  s.images.push_back({"rough", 2, 2, std::vector<std::uint8_t>(16, 0)});
+  s.materials[0].metallic_roughness_texture.image = 0;
+  for (std::size_t i = 0; i < 16; i += 4) s.images[0].pixels[i + 1] = 255;  // rough, not metallic
+  EXPECT_FALSE(calls_for_view_layer(view_materials(s)));
+  for (std::size_t i = 0; i < 16; i += 4) s.images[0].pixels[i + 2] = 255;
+  EXPECT_TRUE(calls_for_view_layer(view_materials(s)));
+}
+
+}  // namespace
+}  // namespace darm::scene
