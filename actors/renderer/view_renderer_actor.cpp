@@ -72,18 +72,19 @@ void ViewRendererActor::take(const ShadeView& wish) {
   tiles = std::move(kept);
 }
 
-// The first pass over what is new first, by share; then where share times the fall of squared error per sample is most.
-void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, Batch& batch) const {
+// The first pass over what is new first, by share and by how long it has waited (an eye that never rests would else
+// starve the last); then where share times the fall of squared error per sample is most.
+void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, Batch& batch) {
   struct Candidate {
     double gain;
     TileId tile;
-    const Held* held;
+    Held* held;
   };
   std::vector<Candidate> candidates;
-  for (const auto& [tile, held] : view.tiles) {
+  for (auto& [tile, held] : view.tiles) {
     if (held.tile->finished(parts_->options.tile)) continue;
     const double n = double{held.tile->least()};
-    const double gain = n < 1 ? 1e9 * (1.0 + double{held.share}) : double{held.share * held.tile->display_variance()} / (n * (n + 1));
+    const double gain = n < 1 ? 1e9 * (1e-4 + double{held.share}) * static_cast<double>(batch_number_ + 1 - held.batch) : double{held.share * held.tile->display_variance()} / (n * (n + 1));
     candidates.push_back({gain / std::max(1, held.tile->wanted()), tile, &held});
   }
   std::sort(candidates.begin(), candidates.end(),
@@ -92,6 +93,7 @@ void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, B
     if (budget <= 0) return;
     const auto wanted = static_cast<std::uint32_t>(std::max(1, c.held->tile->wanted()));
     const float doubling = std::clamp(std::ceil(c.held->tile->least()), 1.0f, 64.0f);
+    c.held->batch = batch_number_ + 1;
     Job job;
     job.session = session;
     job.tile = c.tile;

@@ -43,6 +43,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
   struct Held {
     std::shared_ptr<ViewTile> tile;
     float share = 0;
+    std::uint64_t batch = 0;  // in which it was shaded last
   };
   struct View {
     std::unordered_map<TileId, Held> tiles;
@@ -53,7 +54,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
   void take_wishes();
   void take(const ShadeView& wish);
   void begin_batch();
-  void add_jobs(SessionId session, View& view, double budget, Batch& batch) const;
+  void add_jobs(SessionId session, View& view, double budget, Batch& batch);
   void post(const std::shared_ptr<Batch>& batch);
   static void run(const ViewRendererParts& parts, Job& job);
   void finish_batch();

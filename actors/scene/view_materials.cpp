@@ -8,6 +8,7 @@ namespace darm::scene {
 namespace {
 
 constexpr float kGrey = 0.3f;  // linear radiance around, exposed
+constexpr float kRough = 0.6f;  // from here on a dielectric's coat shows no more than a brightness
 constexpr std::uint32_t kGrid = 32;
 constexpr float kSharpest = 0.1f;  // share of the points whose roughness decides
 
@@ -25,6 +26,7 @@ glm::vec4 texel(const Scene& scene, const TextureRef& texture, std::uint32_t x, 
 
 struct Point {
   float weight = 0;
+  float call = 0;
   float roughness = 1;
 };
 
@@ -44,10 +46,12 @@ Point point_of(const Scene& scene, const Material& m, std::uint32_t x, std::uint
   const float diffuse = base * dielectric * (1.0f - transmission) * (1.0f - fresnel);
   const bool scatters = m.thickness > 0 || roughness * roughness > 1e-3f;  // else what is behind is drawn by the client
   const float through = scatters ? base * dielectric * transmission * (1.0f - fresnel) : 0.0f;
+  const float needed = metallic * base + through + (roughness < kRough ? dielectric * fresnel : 0.0f);
   const float view = metallic * base + dielectric * fresnel + through;
   const float smooth = std::clamp(1.0f - roughness, 0.0f, 1.0f);
   const float contrast = 1.0f + 2.0f * smooth * smooth;
-  return {contrast * (srgb(kGrey * (diffuse + view)) - srgb(kGrey * diffuse)), roughness};
+  const auto shown = [&](float light) { return contrast * (srgb(kGrey * (diffuse + light)) - srgb(kGrey * diffuse)); };
+  return {shown(view), shown(needed), roughness};
 }
 
 // A lobe of roughness r is about r^2 radians wide, and what it reflects changes over about so many pixels.
@@ -67,13 +71,17 @@ ViewMaterial view_material(const Scene& scene, const Material& m) {
   const std::uint32_t grid = textured ? kGrid : 1;
   std::vector<float> roughness;
   double squares = 0;
+  double calls = 0;
   for (std::uint32_t y = 0; y < grid; ++y)
     for (std::uint32_t x = 0; x < grid; ++x) {
       const Point p = point_of(scene, m, x, y);
       squares += double{p.weight} * p.weight;
+      calls += double{p.call} * p.call;
       roughness.push_back(p.roughness);
     }
-  out.weight = std::min(1.0f, static_cast<float>(std::sqrt(squares / static_cast<double>(roughness.size()))));
+  const auto points = static_cast<double>(roughness.size());
+  out.weight = std::min(1.0f, static_cast<float>(std::sqrt(squares / points)));
+  out.call = std::min(1.0f, static_cast<float>(std::sqrt(calls / points)));
   const auto sharp = roughness.begin() + static_cast<std::ptrdiff_t>(kSharpest * static_cast<float>(roughness.size()));
   std::nth_element(roughness.begin(), sharp, roughness.end());
   out.coarser = levels_coarser(*sharp);
@@ -92,7 +100,7 @@ std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialO
   float most = 0;
   for (const auto& instance : scene.instances) {
     out.push_back(of_material[scene.meshes[instance.mesh].material]);
-    most = std::max(most, out.back().weight);
+    most = std::max(most, out.back().call);
   }
   const float least = most >= options.calls ? options.joins : 2.0f;
   for (auto& m : out)

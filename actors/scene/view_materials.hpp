@@ -12,12 +12,14 @@ namespace darm::scene {
 struct ViewMaterial {
   /// Expected display error (0..1) of leaving it out; 0: not worth a private tile.
   float weight = 0;
+  /// The same without the coat of rough dielectrics: what a picture cannot do without (metal is black without it).
+  float call = 0;
   /// Levels under the sharp one at which its light is kept: what a rough lobe reflects is smooth.
   std::uint8_t coarser = 0;
 };
 
 struct ViewMaterialOptions {
-  float calls = 0.05f;  ///< a scene with a material of at least this weight has a private layer
+  float calls = 0.05f;  ///< a scene with a material of at least this call has a private layer
   float joins = 0.01f;  ///< and then everything of at least this weight is in it
 };
 

@@ -130,7 +130,13 @@ void TileSchedulerActor::on(ViewTilesShaded&& message) {
   compose_view(*session);
 }
 
-void TileSchedulerActor::on(CoarsePictured&& message) { coarse_ = std::move(message.picture); }
+void TileSchedulerActor::on(CoarsePictured&& message) {
+  const bool first = coarse_ == nullptr;
+  coarse_ = std::move(message.picture);
+  if (!first) return;
+  for (auto& [id, session] : sessions_)
+    if (session->view_layer) send_view_work(*session);
+}
 
 void TileSchedulerActor::on(FrameDone&& message) {
   for (auto& [id, session] : sessions_) {
@@ -311,10 +317,15 @@ void TileSchedulerActor::reallocate_view(Session& session) {
   const bool had = layer.target_size() > 0;
   layer.reallocate(options_.allocation, layout_->coarse_level());
   metrics_.observe("darm_view_allocation_seconds", double(now_us() - started) * 1e-6);
-  if (layer.target_size() == 0 && !had) return;
   metrics_.observe("darm_view_private_tiles", double(layer.target_size()));
+  if (layer.target_size() > 0 || had) send_view_work(session);
+}
+
+// Until CoarseTex is there nobody has a picture at all, and the cores are the shared light's.
+void TileSchedulerActor::send_view_work(const Session& session) {
+  if (coarse_ == nullptr || !session.posed) return;
   const glm::vec3 eye(session.posed->camera.position - rays_->scene().origin);
-  peers_->view_renderer().tell(renderer::ShadeView(session.id, eye, layer.requests()));
+  peers_->view_renderer().tell(renderer::ShadeView(session.id, eye, session.view_layer->requests()));
 }
 
 void TileSchedulerActor::compose_view(Session& session) {

@@ -123,6 +123,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void open_view(Session& session);
   void close_view(Session& session);
   void reallocate_view(Session& session);
+  void send_view_work(const Session& session);
   void compose_view(Session& session);
 
   std::shared_ptr<const atlas::Layout> layout_;

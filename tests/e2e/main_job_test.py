@@ -35,6 +35,7 @@ class MainJob(unittest.TestCase):
 
     def test_the_picture_matches_the_reference_and_the_report_holds_its_keys(self):
         report = probe(self.daemon.tcp, self.out, "--seconds", "8", "--reference", self.reference,
+                       "--view-phystex", "0",  # the reference is of light for every eye
                        "--ceiling-seconds", "4", "--ceiling-phystex", "4096")
         for key in KEYS:
             self.assertIn(key, report)

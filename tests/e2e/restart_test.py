@@ -13,11 +13,13 @@ class Restart(unittest.TestCase):
             truth = reference(folder)
             state = Path(folder) / "state"
             daemon = Daemon(state)
-            before = probe(daemon.tcp, Path(folder) / "before.png", "--seconds", "8", "--reference", truth)
+            before = probe(daemon.tcp, Path(folder) / "before.png", "--seconds", "8", "--reference", truth,
+                           "--view-phystex", "0")
             daemon.stop(signal.SIGKILL)
             daemon = Daemon(state)
             tiles = int(re.search(r"radiance store: (\d+) tiles", daemon.messages()).group(1))
-            after = probe(daemon.tcp, Path(folder) / "after.png", "--seconds", "3", "--reference", truth)
+            after = probe(daemon.tcp, Path(folder) / "after.png", "--seconds", "3", "--reference", truth,
+                          "--view-phystex", "0")
             self.assertEqual(daemon.stop(), 0)
             self.assertGreater(tiles, 50)
             self.assertGreater(after["series"][0]["psnr"], before["psnr"] - 0.5)

@@ -53,12 +53,13 @@ def probe(port, out, *more, check=True, camera="hall", size="320x180"):
     return json.loads(done.stdout) if done.returncode == 0 else done.stderr
 
 
-def reference(folder, camera="hall", size="320x180", spp=32):
-    """A small view-independent reference, rendered in a second or two by darmd itself."""
-    out = Path(folder) / "reference.png"
+def reference(folder, camera="hall", size="320x180", spp=32, effects="view-independent", name="reference"):
+    """A small reference, rendered in a second or two by darmd itself. `effects` None: all of them."""
+    out = Path(folder) / f"{name}.png"
+    only = ["--effects", effects] if effects else []
     done = subprocess.run(
-        [BIN / "darmd", "render", "--config", SET_UP, "--camera", camera, "--size", size, "--spp", str(spp), "--effects",
-         "view-independent", "--state-dir", folder, "--out", out, "--json"], capture_output=True, text=True, timeout=120)
+        [BIN / "darmd", "render", "--config", SET_UP, "--camera", camera, "--size", size, "--spp", str(spp), *only,
+         "--state-dir", folder, "--out", out, "--json"], capture_output=True, text=True, timeout=120)
     if done.returncode != 0:
         raise AssertionError("darmd render: " + done.stderr)
     return out.with_suffix(".pfm")

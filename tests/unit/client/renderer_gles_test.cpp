@@ -63,6 +63,26 @@ class RendererGles : public ::testing::Test {
     return *image;
   }
 
+  // The same of the private layer, in another place of a PhysTex of its own.
+  void apply_view(wire::StreamFrame frame, const Colour& through = {0, 0, 0}) {
+    auto player = StreamPlayer::create(*scene_, StreamShape{512, false, true});
+    ASSERT_TRUE(player) << player.error().message;
+    if (through != Colour{0, 0, 0}) {
+      std::string tile;
+      for (int i = 0; i < 1024; ++i) tile.append({static_cast<char>(through[0]), static_cast<char>(through[1]),
+                                                  static_cast<char>(through[2])});
+      std::string packed(compressBound(tile.size()), '\0');
+      uLongf size = packed.size();
+      compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(tile.data()), tile.size());
+      packed.resize(size);
+      for (auto& edit : *frame.mutable_page_edits()) edit.set_through(packed);
+    }
+    const auto fate = player->apply(frame, *scene_);
+    ASSERT_TRUE(fate) << fate.error().message;
+    const auto synced = renderer_->synchronise_view(*scene_, *player);
+    ASSERT_TRUE(synced) << synced.error().message;
+  }
+
   void apply(const wire::StreamFrame& frame) {
     const auto fate = player_->apply(frame, *scene_);
     ASSERT_TRUE(fate) << fate.error().message;
@@ -220,6 +240,57 @@ TEST_F(RendererGles, ThinClearSurfacesTintWhatIsBehindInLinearLight) {
   const float own = srgb_to_linear(100 / 255.f);
   EXPECT_NEAR(c[0], 255 * linear_to_srgb(own * 1.5f), 2);
   EXPECT_NEAR(c[1], 100, 2);
+}
+
+TEST_F(RendererGles, AddsThePrivateLayerInLinearLightWhereThereIsOne) {
+  build(synthetic::manifest());
+  apply(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{100, 60, 255}; }, 0, 2));
+  const Colour before = pixel(draw(frontal(64)), 32, 32);
+  EXPECT_EQ(before, (Colour{100, 60, 255}));
+  apply_view(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{120, 0, 90}; }, 1, 1, 40));
+  const Colour c = pixel(draw(frontal(64)), 32, 32);
+  const auto linear = [](int code) { return srgb_to_linear(static_cast<float>(code) / 255.f); };
+  EXPECT_NEAR(c[0], 255 * linear_to_srgb(linear(100) + linear(120)), 1.5);
+  EXPECT_NEAR(c[1], 60, 1);
+  EXPECT_EQ(c[2], 255) << "as bright as the display can be";
+  // Another private stream takes its place: nothing is left of the first.
+  apply_view(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{0, 0, 0}; }, 2, 2, 7));
+  EXPECT_NEAR(pixel(draw(frontal(64)), 32, 32)[1], 60, 1);
+}
+
+TEST_F(RendererGles, DimsSharedLightByFresnelsTermWhereItsReflectionIsPrivate) {
+  auto manifest = synthetic::manifest();
+  manifest.mutable_instances(0)->set_f0(0.04f);
+  build(manifest);
+  apply(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{100, 100, 100}; }, 0, 2));
+  apply_view(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{0, 0, 0}; }, 2, 2));
+  const float shared = srgb_to_linear(100 / 255.f);
+  EXPECT_NEAR(pixel(draw(look_at({1, 1, 1}, {1, 1, 0}, 5, 33, 33)), 16, 16)[0],
+              255 * linear_to_srgb(1.05f * shared), 1.5);
+  const double slope = 0.1;
+  const Colour grazing = pixel(draw(look_at({1, -2, slope * 3}, {1, 1, 0}, 2, 33, 33)), 16, 16);
+  const double m = 1 - slope / std::hypot(1.0, slope);
+  EXPECT_NEAR(grazing[0], 255 * linear_to_srgb(static_cast<float>(1.05 * (1 - std::pow(m, 5))) * shared), 2);
+}
+
+TEST_F(RendererGles, ClearSurfacesPassWhatTheirPrivateTilesSayAndAddTheirReflection) {
+  auto manifest = synthetic::manifest();
+  auto pane = synthetic::instance_at(0, 0, 0.25f);
+  pane.set_transmission(1.0f);
+  pane.set_f0(0.04f);
+  *manifest.add_instances() = pane;
+  build(manifest);
+  apply(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{150, 150, 150}; }, 0, 2));
+  apply_view(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{80, 80, 80}; }, 0, 2), {255, 128, 0});
+  const Colour c = pixel(draw(look_at({1, 1, 1}, {1, 1, 0}, 5, 33, 33)), 16, 16);
+  // One patch serves both: wall and pane have the same shared and private light. Only the pane has f0 and passes light.
+  const float shared = srgb_to_linear(150 / 255.f), own = srgb_to_linear(80 / 255.f);
+  const auto expected = [&](float through) {
+    return 255 * linear_to_srgb(std::min(1.0f, 1.05f * shared + own + 0.96f * through * (shared + own)));
+  };
+  EXPECT_NEAR(c[0], expected(1), 2);
+  EXPECT_NEAR(c[1], expected(srgb_to_linear(128 / 255.f)), 2);
+  EXPECT_NEAR(c[2], expected(0), 2) << "what blurs is opaque";
 }
 
 TEST_F(RendererGles, CoverageCutsMaskedAndFadesBlendedSurfaces) {

@@ -229,5 +229,32 @@ TEST_F(Player, CodedStreamIsDrawnInItsColours) {
   for (std::size_t i = 0; i < image->rgb.size(); ++i) ASSERT_NEAR(image->rgb[i], expected[i % 3], 5) << "byte " << i;
 }
 
+TEST_F(Player, RefusesAShareOfWhatIsBehindThatIsNoTileAndKeepsItWithTheTile) {
+  open(true);
+  const auto packed = [](std::size_t n) {
+    const std::string tile(n, '\x55');
+    std::string out(compressBound(n), '\0');
+    uLongf size = out.size();
+    compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(tile.data()), n);
+    out.resize(size);
+    return out;
+  };
+  auto f = synthetic::key_frame([](std::uint32_t, int, int) { return synthetic::Colour{1, 2, 3}; }, 2, 2);
+  for (const auto& bad : {std::string("junk"), packed(3071), packed(1024), packed(5000)}) {
+    f.mutable_page_edits(0)->set_through(bad);
+    EXPECT_FALSE(player_->apply(f, *scene_));
+    EXPECT_TRUE(player_->take_through().empty());
+  }
+  f.mutable_page_edits(0)->set_through(packed(3072));
+  EXPECT_EQ(apply(f), FrameFate::kApplied);
+  EXPECT_EQ(player_->take_through().at(3).size(), 3072u);
+  f.mutable_page_edits(0)->clear_through();  // the tile stays: so does what came with it
+  EXPECT_EQ(apply(f), FrameFate::kApplied);
+  EXPECT_TRUE(player_->take_through().empty());
+  f.mutable_page_edits(0)->set_tile(1u << 28);  // another tile, opaque
+  EXPECT_EQ(apply(f), FrameFate::kApplied);
+  EXPECT_EQ(player_->take_through().at(3), std::string(3072, '\0'));
+}
+
 }  // namespace
 }  // namespace darm::client

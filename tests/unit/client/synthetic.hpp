@@ -98,11 +98,12 @@ inline std::string slot_bytes(const Atlas& atlas, std::uint32_t level, std::uint
 }
 
 /// Lossless key frame with every tile of levels [first, last] in slots that follow one another from 3 on.
-inline wire::StreamFrame key_frame(const Atlas& atlas, std::uint32_t first_level, std::uint32_t last_level) {
+inline wire::StreamFrame key_frame(const Atlas& atlas, std::uint32_t first_level, std::uint32_t last_level,
+                                   std::uint32_t first_slot = 3) {
   wire::StreamFrame f;
   f.set_frame(1);
   f.set_key(true);
-  std::uint32_t slot = 3;
+  std::uint32_t slot = first_slot;
   for (std::uint32_t l = first_level; l <= last_level; ++l) {
     for (std::uint32_t i = 0; i < kTilesPerAxis[l] * kTilesPerAxis[l]; ++i, ++slot) {
       auto& edit = *f.add_page_edits();

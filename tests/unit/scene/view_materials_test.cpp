@@ -37,7 +37,9 @@ TEST(ViewMaterials, a_scene_of_matte_surfaces_has_no_private_layer) {
   matte.ior = 1;
   Material unlit = mirror();
   unlit.unlit = true;
-  const auto weights = view_materials(scene_of({plaster(0.9f), plaster(1.0f), matte, unlit}));
+  Material dark = plaster(0.8f);
+  dark.base_color = glm::vec4(0.02f, 0.02f, 0.02f, 1.0f);
+  const auto weights = view_materials(scene_of({plaster(0.9f), plaster(1.0f), matte, unlit, dark}));
   EXPECT_FALSE(calls_for_view_layer(weights));
   for (const auto& m : weights) EXPECT_EQ(m.weight, 0.0f);
 }

@@ -56,6 +56,32 @@ TEST(SendQueue, starts_with_a_key_frame) {
   EXPECT_FALSE(q.ask_for_key(5'000'000));
 }
 
+TEST(SendQueue, the_layers_lose_pictures_each_for_itself) {
+  const auto own = [](FrameNumber number, bool key) {
+    auto f = std::make_shared<EncodedFrame>();
+    f->layer = StreamLayer::kView;
+    f->frame = number;
+    f->key = key;
+    f->h264.resize(100);
+    return f;
+  };
+  SendQueue q{SendLimits{}};
+  EXPECT_FALSE(q.ask_for_key(0, StreamLayer::kView)) << "a private layer may never begin";
+  EXPECT_TRUE(q.push_picture(picture(1, true), answer(1), 0));
+  EXPECT_FALSE(q.push_picture(own(5, false), answer(0), 0));
+  EXPECT_TRUE(q.ask_for_key(1, StreamLayer::kView));
+  EXPECT_FALSE(q.ask_for_key(1));
+  EXPECT_TRUE(q.push_picture(own(6, true), answer(0), 2));
+  // Too old by now: the private pictures go, the shared ones as well when their own next one comes, not before.
+  EXPECT_FALSE(q.push_picture(own(7, false), answer(0), 900'000));
+  EXPECT_EQ(q.pictures_dropped(), 3u);
+  EXPECT_TRUE(q.push_picture(own(8, true), answer(0), 900'001));
+  Taker taker;
+  while (taker.take(q, 900'002)) q.sent();
+  EXPECT_EQ(taker.frames, (std::vector<FrameNumber>{1, 8}));
+  EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 0}));
+}
+
 TEST(SendQueue, one_packet_at_a_time_in_order) {
   SendQueue q{SendLimits{}};
   Taker t;

@@ -123,6 +123,40 @@ TEST_F(SessionProtocolTest, formats_are_what_both_sides_can_do) {
   EXPECT_TRUE(format(16384, false, true, true).lossless_rgb);
 }
 
+TEST_F(SessionProtocolTest, a_private_layer_is_agreed_on_only_where_both_sides_have_one) {
+  const auto agreed = [&](std::uint32_t offered, std::uint32_t wanted, bool lossless) {
+    SessionPolicy policy;
+    policy.view_phystex = offered;
+    policy.allow_lossless = true;
+    start(policy);
+    auto e = hello();
+    e.mutable_hello()->set_max_view_phystex(wanted);
+    e.mutable_hello()->set_lossless(lossless);
+    std::uint32_t size = 0;
+    for (const auto& a : say(e))
+      if (const auto* o = std::get_if<tile_scheduler::SessionOpened>(&a)) size = o->format.view_phystex;
+    EXPECT_EQ(heard()[0].welcome().view_phystex(), size);
+    return size;
+  };
+  EXPECT_EQ(agreed(1024, 1024, false), 1024u);
+  EXPECT_EQ(agreed(1024, 700, false), 512u);
+  EXPECT_EQ(agreed(512, 0xffffffffu, false), 512u);
+  EXPECT_EQ(agreed(1024, 0, false), 0u) << "a client of before";
+  EXPECT_EQ(agreed(1024, 256, false), 0u);
+  EXPECT_EQ(agreed(0, 1024, false), 0u) << "nothing calls for it";
+  EXPECT_EQ(agreed(1024, 8192, true), 2048u);
+}
+
+TEST_F(SessionProtocolTest, a_client_may_ask_for_a_key_frame_of_either_layer) {
+  start();
+  static_cast<void>(say(hello()));
+  wire::Envelope e;
+  e.mutable_feedback()->set_view_key_frame_wanted(true);
+  const auto actions = say(e);
+  ASSERT_EQ(count<tile_scheduler::KeyFrameWanted>(actions), 1);
+  EXPECT_EQ(std::get<tile_scheduler::KeyFrameWanted>(actions[0]).layer, StreamLayer::kView);
+}
+
 TEST_F(SessionProtocolTest, unknown_versions_are_refused_with_a_reason) {
   start();
   auto e = hello();
@@ -215,7 +249,7 @@ TEST_F(SessionProtocolTest, frames_carry_picture_table_answer_and_stamps) {
   frame->error = 0.5f;
   auto coverage = std::make_shared<CoverageTile>();
   coverage->fill(200);
-  frame->edits.push_back({TileId(2, 34), 56, coverage});
+  frame->edits.push_back({TileId(2, 34), 56, coverage, nullptr});
   ViewAnswer answer;
   answer.sequence = 4;
   answer.stamps.camera_received = 11;
