@@ -192,9 +192,9 @@ void Daemon::Parts::spawn_actors() {
   auto renderer_ref = std::make_shared<LateRef<renderer::Inbox>>();
   auto view_ref = std::make_shared<LateRef<renderer::ViewInbox>>();
   auto peers = std::make_shared<tile_scheduler::Peers>(make_peers(renderer_ref, view_ref));
-  scheduler = system->spawn<tile_scheduler::TileSchedulerActor>("tile_scheduler", kMailbox, world.layout, world.rays,
-                                                                peers, scheduler_options(config), metrics,
-                                                                world.view_materials);
+  scheduler =
+      system->spawn<tile_scheduler::TileSchedulerActor>("tile_scheduler", kMailbox, world.layout, world.rays, peers,
+                                                        scheduler_options(config), metrics, world.view_materials);
   spawn_view_renderer(*view_ref);
   renderer::RendererParts parts;
   parts.surfaces = renderer::make_scene_surfaces(world.scene, world.mapper, world.transport, seed);

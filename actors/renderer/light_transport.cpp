@@ -370,8 +370,8 @@ ViewDependentLight LightTransport::view_dependent(const SurfacePoint& point, con
     return made;
   }
   const BsdfScatter scatter(s, m, wo, Lobes::kSpecular);
-  glm::vec3 light = suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, 1) +
-                    emitters_at(s, scatter, sampler);
+  glm::vec3 light =
+      suns_at(s, scatter, sampler) + punctual_at(s, scatter, sampler, 1) + emitters_at(s, scatter, sampler);
   if (const BsdfSample next = scatter.sample(sampler); next.pdf > 0) {
     Path path;
     path.throughput = next.weight;

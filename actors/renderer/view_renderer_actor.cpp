@@ -84,7 +84,8 @@ void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, B
   for (auto& [tile, held] : view.tiles) {
     if (held.tile->finished(parts_->options.tile)) continue;
     const double n = double{held.tile->least()};
-    const double gain = n < 1 ? 1e9 * (1e-4 + double{held.share}) * static_cast<double>(batch_number_ + 1 - held.batch) : double{held.share * held.tile->display_variance()} / (n * (n + 1));
+    const double gain = n < 1 ? 1e9 * (1e-4 + double{held.share}) * static_cast<double>(batch_number_ + 1 - held.batch)
+                              : double{held.share * held.tile->display_variance()} / (n * (n + 1));
     candidates.push_back({gain / std::max(1, held.tile->wanted()), tile, &held});
   }
   std::sort(candidates.begin(), candidates.end(),
@@ -110,8 +111,8 @@ void ViewRendererActor::begin_batch() {
   take_wishes();
   if (views_.empty()) return;
   auto batch = std::make_shared<Batch>();
-  const double budget =
-      double{parts_->options.batch_ms} * 1000.0 * executor().workers() / sample_us_ / static_cast<double>(views_.size());
+  const double budget = double{parts_->options.batch_ms} * 1000.0 * executor().workers() / sample_us_ /
+                        static_cast<double>(views_.size());
   for (auto& [session, view] : views_) add_jobs(session, view, budget, *batch);
   if (!batch->jobs.empty()) post(batch);
 }
@@ -176,7 +177,8 @@ void ViewRendererActor::finish_batch() {
     shaded.image = std::move(job.picture->image);
     pictures[job.session].push_back(std::move(shaded));
   }
-  if (samples >= 64) sample_us_ += 0.25 * (std::clamp(seconds * 1e6 / static_cast<double>(samples), 0.2, 5000.0) - sample_us_);
+  if (samples >= 64)
+    sample_us_ += 0.25 * (std::clamp(seconds * 1e6 / static_cast<double>(samples), 0.2, 5000.0) - sample_us_);
   metrics().count("darm_view_samples_total", static_cast<double>(samples));
   metrics().count("darm_view_shade_seconds_total", seconds);
   for (auto& [session, tiles] : pictures) publish(session, std::move(tiles));
@@ -191,7 +193,8 @@ void ViewRendererActor::publish(SessionId session, std::vector<tile_scheduler::S
   const auto view = views_.find(session);
   if (view == views_.end()) return;
   for (const auto tile : names)
-    if (const auto held = view->second.tiles.find(tile); held != view->second.tiles.end()) held->second.tile->forget_picture();
+    if (const auto held = view->second.tiles.find(tile); held != view->second.tiles.end())
+      held->second.tile->forget_picture();
 }
 
 }  // namespace darm::renderer

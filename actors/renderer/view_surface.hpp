@@ -12,7 +12,8 @@
 
 namespace darm::renderer {
 
-/// One slot: the tile's payload and, around it, the nearest texels of its neighbours. `at` is y * 32 + x. For one thread.
+/// One slot: the tile's payload and, around it, the nearest texels of its neighbours. `at` is y * 32 + x. For one
+/// thread.
 class ViewSurface {
  public:
   virtual ~ViewSurface() = default;

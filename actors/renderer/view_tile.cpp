@@ -12,9 +12,9 @@
 namespace darm::renderer {
 namespace {
 
-constexpr float kTamedUpTo = 256;       // samples; see tamed()
-constexpr float kTamedFloor = 0.02f;    // linear display value below which nothing is an outlier
-constexpr float kPedestal = 0.01f;      // linear display value
+constexpr float kTamedUpTo = 256;         // samples; see tamed()
+constexpr float kTamedFloor = 0.02f;      // linear display value below which nothing is an outlier
+constexpr float kPedestal = 0.01f;        // linear display value
 constexpr float kWideLobe = 0.2f;         // GGX alpha from which neighbouring texels reflect much the same
 constexpr float kFadeOfForgotten = 0.5f;  // a picture counts so much less after the eye moved a little
 
@@ -164,8 +164,7 @@ TilePicture ViewTile::draw(ViewSurface& surface) {
     fill.patch[static_cast<std::size_t>(at)] = surface.patch(at);
     const auto& texel = texels_[static_cast<std::size_t>(at)];
     if (!texel.shown || dead_.test(at)) continue;
-    light[static_cast<std::size_t>(at)] =
-        luminance(texel.mean) * exposure_ > kTamedFloor ? tamed(at) : texel.mean;
+    light[static_cast<std::size_t>(at)] = luminance(texel.mean) * exposure_ > kTamedFloor ? tamed(at) : texel.mean;
   }
   const int radius = filter_radius();
   for (int at = 0; at < kSlotTexels; ++at) {

@@ -7,7 +7,7 @@
 namespace darm::scene {
 namespace {
 
-constexpr float kGrey = 0.3f;  // linear radiance around, exposed
+constexpr float kGrey = 0.3f;   // linear radiance around, exposed
 constexpr float kRough = 0.6f;  // from here on a dielectric's coat shows no more than a brightness
 constexpr std::uint32_t kGrid = 32;
 constexpr float kSharpest = 0.1f;  // share of the points whose roughness decides

@@ -24,8 +24,8 @@ struct ViewMaterialOptions {
 };
 
 /// Reads a material and a grid of points of its textures. The weight of a point: what a grey surrounding of display
-/// value about .6 (linear 0.3) would add to its diffuse light, as a difference of display values, times 1 to 3 for lobes
-/// so narrow that they show what they reflect. Of the material: RMS over the points.
+/// value about .6 (linear 0.3) would add to its diffuse light, as a difference of display values, times 1 to 3 for
+/// lobes so narrow that they show what they reflect. Of the material: RMS over the points.
 [[nodiscard]] ViewMaterial view_material(const Scene& scene, const Material& material);
 
 /// One per instance. All weights are 0 if nothing in the scene calls for a private layer.

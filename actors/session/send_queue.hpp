@@ -21,8 +21,8 @@ struct SendLimits {
 
 /// First in, first out. Control messages and geometry are never dropped. Pictures are dropped whole, and all that wait
 /// together with the new one, because each builds on the one before; then only a key frame is taken. The two layers are
-/// streams of their own in this, with limits of their own. While geometry waits no picture is taken. The answer of a dropped picture travels with the next one that is sent. No clock inside:
-/// `now` must not decrease.
+/// streams of their own in this, with limits of their own. While geometry waits no picture is taken. The answer of a
+/// dropped picture travels with the next one that is sent. No clock inside: `now` must not decrease.
 class SendQueue {
  public:
   explicit SendQueue(const SendLimits& limits) : limits_(limits) {}

@@ -24,7 +24,7 @@ namespace darm::session {
 struct SessionPolicy {
   std::uint32_t phystex_size = 2048;  ///< most a client gets: 1024, 2048 or 4096
   bool allow_chroma_444 = true;
-  bool allow_lossless = false;  ///< tiles without codec, PhysTex up to 8192 (evaluation)
+  bool allow_lossless = false;     ///< tiles without codec, PhysTex up to 8192 (evaluation)
   std::uint32_t view_phystex = 0;  ///< most of a private layer: 0 (the scene calls for none), 512 or 1024
   float updates_per_second = 10.0f;
   Camera start;  ///< where a client without a pose begins

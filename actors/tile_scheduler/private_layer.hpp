@@ -1,5 +1,5 @@
-// The private layer of one session as the scheduler knows it: what its eye sees of light that depends on it, which tiles
-// get its slots, and its stream. Pure.
+// The private layer of one session as the scheduler knows it: what its eye sees of light that depends on it, which
+// tiles get its slots, and its stream. Pure.
 #pragma once
 
 #include <memory>

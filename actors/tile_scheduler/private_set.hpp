@@ -1,4 +1,5 @@
-// What one camera sees that depends on its eye: chains by what they are worth, tiles with the slot texels that are read.
+// What one camera sees that depends on its eye: chains by what they are worth, tiles with the slot texels that are
+// read.
 #pragma once
 
 #include <cstddef>

@@ -211,8 +211,7 @@ void TileSchedulerActor::start_view(Session& session) {
   }
   session.last_start = now_us();
   auto job = std::make_shared<ViewJob>(next_job_++, layout_, rays_, session.view->camera, session.view->viewport, done,
-                                       count, 2 * executor().workers(),
-                                       session.view_layer ? view_materials_ : nullptr);
+                                       count, 2 * executor().workers(), session.view_layer ? view_materials_ : nullptr);
   job->answer = answer;
   if (!unanswered) job->answer.sequence = 0;
   job->starts_pose = moved;

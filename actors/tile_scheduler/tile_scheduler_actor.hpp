@@ -92,11 +92,9 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
     int updates_waited = 0;
-    Microseconds asked_at = 0;  // for the first pictures
-    std::optional<Microseconds> key_forced_at;
-    bool key_put_off = false;     // asked for again too soon after that
-    Microseconds weighed_at = 0;  // of demand.target
-    bool pictures_since = false;  // some came after that
+    Microseconds asked_at = 0;               // for the first pictures
+    Microseconds weighed_at = 0;             // of demand.target
+    bool pictures_since = false;             // some came after that
     std::optional<PrivateLayer> view_layer;  // what depends on its eye
     StreamId view_stream_id{};
     runtime::Ref<encoder::Inbox> view_encoder;  // made with its first frame

@@ -14,7 +14,8 @@ class SlotMask {
  public:
   /// Columns x0..x1 of row y, inclusive; all within [0, 31].
   constexpr void set_row(int y, int x0, int x1) {
-    const std::uint32_t row = (0xffffffffu >> static_cast<unsigned>(31 - x1)) & (0xffffffffu << static_cast<unsigned>(x0));
+    const std::uint32_t row =
+        (0xffffffffu >> static_cast<unsigned>(31 - x1)) & (0xffffffffu << static_cast<unsigned>(x0));
     rows_[static_cast<std::size_t>(y)] |= row;
   }
   [[nodiscard]] constexpr bool test(int at) const {

@@ -314,7 +314,8 @@ Result<void> GlesRenderer::State::draw_item(const SceneModel& scene, const View&
   return {};
 }
 
-// Far faces before near ones, each twice: what is behind is multiplied by what comes through, then their light is added.
+// Far faces before near ones, each twice: what is behind is multiplied by what comes through, then their light is
+// added.
 Result<void> GlesRenderer::State::draw_clear_item(const SceneModel& scene, const View& view, const Item& item,
                                                   const glm::dmat4& to_clip) {
   const bool both = scene.instances()[item.instance].camera_sees_back;

@@ -221,8 +221,9 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_flag("--lossless", a.lossless, "stream without codec (the server must allow it)");
   app.add_flag("--no-444", a.no_444, "do not offer 4:4:4 chroma");
   app.add_option("--phystex", a.phystex, "largest PhysTex to accept, pixels")->capture_default_str();
-  app.add_option("--view-phystex", a.view_phystex,
-                 "largest PhysTex of the private layer to accept, pixels; 0: only light that does not depend on the eye")
+  app.add_option(
+         "--view-phystex", a.view_phystex,
+         "largest PhysTex of the private layer to accept, pixels; 0: only light that does not depend on the eye")
       ->capture_default_str();
   app.add_option("--updates-per-second", a.updates_per_second, "cameras sent, also when still")
       ->capture_default_str()

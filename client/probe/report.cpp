@@ -105,9 +105,9 @@ std::string to_text(const Outcome& o) {
                       100 * share(s.residency.coarse_tex, s.residency.samples),
                       100 * share(s.residency.background, s.residency.samples));
   if (s.view_phystex_size > 0)
-    text += fmt::format("private layer: {} slots of {}x{}, {} frames, {:.2f} MB\n", s.view_slots_used,
-                        s.view_phystex_size, s.view_phystex_size, s.view_frames,
-                        static_cast<double>(s.view_bytes) / 1e6);
+    text +=
+        fmt::format("private layer: {} slots of {}x{}, {} frames, {:.2f} MB\n", s.view_slots_used, s.view_phystex_size,
+                    s.view_phystex_size, s.view_frames, static_cast<double>(s.view_bytes) / 1e6);
   for (const auto& [stage, values] : s.latency_ms) {
     text +=
         fmt::format("{:>12}: p50 {:.1f} ms, p99 {:.1f} ms\n", stage, percentile(values, 0.5), percentile(values, 0.99));

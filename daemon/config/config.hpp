@@ -84,9 +84,10 @@ struct AccuracyConfig {
 
 /// [stream]
 struct StreamConfig {
-  double updates_per_second = 10;    ///< at most this many frames per stream
-  std::uint32_t phystex = 2048;      ///< largest PhysTex offered, pixels square: 1024, 2048 or 4096
-  std::uint32_t view_phystex = 1024;  ///< largest private PhysTex offered where a scene calls for one: 0 (none), 512, 1024
+  double updates_per_second = 10;  ///< at most this many frames per stream
+  std::uint32_t phystex = 2048;    ///< largest PhysTex offered, pixels square: 1024, 2048 or 4096
+  std::uint32_t view_phystex =
+      1024;  ///< largest private PhysTex offered where a scene calls for one: 0 (none), 512, 1024
   std::uint32_t max_writes = 1024;   ///< slots rewritten per frame at most
   std::uint32_t crf = 18;            ///< x264 constant rate factor: 0 best .. 51 worst
   std::string preset = "superfast";  ///< x264 preset

@@ -17,7 +17,8 @@ using Pictures = std::map<SessionId, std::vector<tile_scheduler::ShadedTile>>;
 // Stands in for the tile scheduler: keeps what it is told.
 class Listener : public runtime::Actor<tile_scheduler::Inbox> {
  public:
-  Listener(runtime::Context<tile_scheduler::Inbox> context, Pictures* heard) : Actor(std::move(context)), heard_(heard) {}
+  Listener(runtime::Context<tile_scheduler::Inbox> context, Pictures* heard)
+      : Actor(std::move(context)), heard_(heard) {}
   void on(tile_scheduler::ViewTilesShaded&& m) {
     for (auto& t : m.tiles) (*heard_)[m.session].push_back(std::move(t));
   }

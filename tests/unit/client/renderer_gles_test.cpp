@@ -69,11 +69,12 @@ class RendererGles : public ::testing::Test {
     ASSERT_TRUE(player) << player.error().message;
     if (through != Colour{0, 0, 0}) {
       std::string tile;
-      for (int i = 0; i < 1024; ++i) tile.append({static_cast<char>(through[0]), static_cast<char>(through[1]),
-                                                  static_cast<char>(through[2])});
+      for (int i = 0; i < 1024; ++i)
+        tile.append({static_cast<char>(through[0]), static_cast<char>(through[1]), static_cast<char>(through[2])});
       std::string packed(compressBound(tile.size()), '\0');
       uLongf size = packed.size();
-      compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(tile.data()), tile.size());
+      compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(tile.data()),
+               tile.size());
       packed.resize(size);
       for (auto& edit : *frame.mutable_page_edits()) edit.set_through(packed);
     }
@@ -265,8 +266,8 @@ TEST_F(RendererGles, DimsSharedLightByFresnelsTermWhereItsReflectionIsPrivate) {
   apply(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{100, 100, 100}; }, 0, 2));
   apply_view(synthetic::key_frame([](std::uint32_t, int, int) { return Colour{0, 0, 0}; }, 2, 2));
   const float shared = srgb_to_linear(100 / 255.f);
-  EXPECT_NEAR(pixel(draw(look_at({1, 1, 1}, {1, 1, 0}, 5, 33, 33)), 16, 16)[0],
-              255 * linear_to_srgb(1.05f * shared), 1.5);
+  EXPECT_NEAR(pixel(draw(look_at({1, 1, 1}, {1, 1, 0}, 5, 33, 33)), 16, 16)[0], 255 * linear_to_srgb(1.05f * shared),
+              1.5);
   const double slope = 0.1;
   const Colour grazing = pixel(draw(look_at({1, -2, slope * 3}, {1, 1, 0}, 2, 33, 33)), 16, 16);
   const double m = 1 - slope / std::hypot(1.0, slope);

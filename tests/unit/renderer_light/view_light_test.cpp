@@ -56,7 +56,8 @@ scene::Material plastic(glm::vec3 base, float roughness) {
 HandScene room_with(const scene::Material& material) {
   HandScene hand;
   hand.quad({-0.5f, -0.8f, 0.5f}, {1, 0, 0}, {0, 0, -1}, hand.material(material));
-  hand.box(glm::vec3(-1), glm::vec3(1), hand.material(HandScene::matte(glm::vec3(0.4f), glm::vec3(0.2f, 0.3f, 0.5f))), true);
+  hand.box(glm::vec3(-1), glm::vec3(1), hand.material(HandScene::matte(glm::vec3(0.4f), glm::vec3(0.2f, 0.3f, 0.5f))),
+           true);
   hand.quad({-0.9f, 0.9f, 0.2f}, {0, 0, 0.5f}, {0.5f, 0, 0},
             hand.material(HandScene::matte(glm::vec3(0.2f), glm::vec3(6.0f))));
   return hand;
@@ -104,8 +105,12 @@ TEST(ViewLight, with_it_the_light_for_all_eyes_is_all_light) {
   frosted.double_sided = true;
   scene::Material half = metal({0.9f, 0.6f, 0.2f}, 0.3f);
   half.metallic = 0.5f;
-  const std::vector<scene::Material> materials{plastic({0.8f, 0.6f, 0.4f}, 0.9f), plastic({0.2f, 0.2f, 0.9f}, 0.1f),
-                                               metal({0.9f, 0.7f, 0.3f}, 0.25f), half, glow, frosted};
+  const std::vector<scene::Material> materials{plastic({0.8f, 0.6f, 0.4f}, 0.9f),
+                                               plastic({0.2f, 0.2f, 0.9f}, 0.1f),
+                                               metal({0.9f, 0.7f, 0.3f}, 0.25f),
+                                               half,
+                                               glow,
+                                               frosted};
   std::uint64_t seed = 1;
   for (const auto& material : materials) {
     const auto transport = transport_of(room_with(material));
@@ -114,7 +119,8 @@ TEST(ViewLight, with_it_the_light_for_all_eyes_is_all_light) {
       const glm::vec2 uv = where.next_2d() * 0.5f;
       const SurfacePoint point{0, 0, uv.x, uv.y, true};
       const glm::vec3 position = trace::make_surface(transport.rays(), point).position;
-      const glm::vec3 eye = position + [](const glm::vec3& d) { return glm::vec3(d.x, d.z, d.y); }(sample_cosine(where.next_2d())) * 0.5f;
+      const glm::vec3 eye =
+          position + [](const glm::vec3& d) { return glm::vec3(d.x, d.z, d.y); }(sample_cosine(where.next_2d())) * 0.5f;
       const trace::Ray ray{eye, 0, glm::normalize(position - eye), 1e30f};
       const double own = transport.emission(point).y;
       const auto all = estimate(8192, [&](Sampler& s) { return transport.full_radiance(ray, s).y; }, seed++);
@@ -166,8 +172,9 @@ TEST(ViewLight, a_refracting_ball_is_opaque_and_shows_what_lies_behind_it) {
   // A furnace: nothing is absorbed, so that the block cannot be seen.
   const SurfacePoint side{0, 0, 0.3f, 0.3f, true};
   const auto s = trace::make_surface(transport.rays(), side);
-  const auto e = estimate(
-      4096, [&](Sampler& p) { return transport.view_dependent(side, s.position + s.geometric_normal * 2.0f, p).radiance.x; });
+  const auto e = estimate(4096, [&](Sampler& p) {
+    return transport.view_dependent(side, s.position + s.geometric_normal * 2.0f, p).radiance.x;
+  });
   EXPECT_NEAR(e.mean, 1.0, 5 * e.error + 0.03);
   EXPECT_EQ(transport.clear_tint(side), glm::vec3(0.0f));
 }

@@ -25,7 +25,9 @@ class ViewTileTest : public ::testing::Test {
       return l;
     };
   }
-  std::uint8_t code(int x, int y) { return tile.draw(slot).image->rgb[static_cast<std::size_t>((y * kSlotSize + x) * 3)]; }
+  std::uint8_t code(int x, int y) {
+    return tile.draw(slot).image->rgb[static_cast<std::size_t>((y * kSlotSize + x) * 3)];
+  }
 
   MadeUpView world;
   MadeUpSlot slot{kTile, world};

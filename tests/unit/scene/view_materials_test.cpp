@@ -63,7 +63,8 @@ TEST(ViewMaterials, polish_metal_and_glass_call_for_it) {
   ball.thickness = 0.1f;
   Material brass = mirror();
   brass.roughness = 0.35f;
-  for (const auto& m : {plaster(0.05f), pane, ball, brass}) EXPECT_TRUE(calls_for_view_layer(view_materials(scene_of({m}))));
+  for (const auto& m : {plaster(0.05f), pane, ball, brass})
+    EXPECT_TRUE(calls_for_view_layer(view_materials(scene_of({m}))));
 }
 
 TEST(ViewMaterials, textures_are_read_not_guessed) {
