@@ -211,8 +211,9 @@ void main() {
 #else
 #ifdef VIEW
   vec3 shared_light = to_linear(light);
-  // What is as bright as the display can be was cut there, and how much is not known: it is not dimmed.
-  shared_light *= mix(vec3(factor), vec3(max(factor, 1.0)), smoothstep(0.9, 1.0, shared_light));
+  // What is as bright as the display can be was cut there, and how much is not known: it is taken for 1.4.
+  float cut = min(1.4 * factor, max(factor, 1.0));
+  shared_light *= mix(vec3(factor), vec3(cut), smoothstep(0.985, 1.0, shared_light));
   vec3 sum = min(shared_light + own, vec3(1.0));
 #ifdef LINEAR
   o_colour = vec4(sum, coverage);
