@@ -19,8 +19,8 @@ struct ViewRendererOptions {
   ViewTileOptions tile;
   float slice_ms = 6;
   float batch_ms = 40;               ///< of shading between two looks at what sessions want
-  std::uint32_t job_samples = 1500;  ///< about so many in one job
-  std::size_t max_tiles = 16384;     ///< of all sessions, 24 KB each; what is over is not shaded
+  std::uint32_t job_samples = 1000;  ///< about so many in one job, but a tile is shaded whole
+  std::size_t max_tiles = 16384;     ///< of all sessions, 28 KB each; what is over is not shaded
 };
 
 /// Everything but the options is shared with pool work and must be non-null.

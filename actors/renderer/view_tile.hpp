@@ -22,7 +22,7 @@ struct ViewTileOptions {
   float least_turn = 2e-4f;  ///< radians under which the eye counts as at rest: a tenth of a pixel
 };
 
-/// 24 KB. One thread at a time.
+/// 28 KB. One thread at a time.
 class ViewTile {
  public:
   explicit ViewTile(float exposure) : texels_(kSlotTexels), exposure_(exposure) {}

@@ -301,6 +301,9 @@ Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& optio
   if (s.welcome.version() != proto::kProtocolVersion)
     return fail(fmt::format("server: speaks protocol version {}, this client {}", s.welcome.version(),
                             proto::kProtocolVersion));
+  if (s.welcome.view_phystex() > options.max_view_phystex)
+    return fail(fmt::format("server: offers a private layer of {} pixels, asked for was {}", s.welcome.view_phystex(),
+                            options.max_view_phystex));
   s.key = proto::datagram_key(s.welcome.key());
   if (s.key) s.udp = udp_beside(s.tcp.get(), s.welcome.udp_port());
   return connection;

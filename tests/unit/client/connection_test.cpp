@@ -128,6 +128,20 @@ TEST(Connection, ShakesHandsTalksAndSaysGoodbye) {
   EXPECT_EQ((*message)->bytes_total, (*connection)->bytes_received());
 }
 
+TEST(Connection, APrivateLayerLargerThanAskedForIsRefused) {
+  FakeServer server([](Peer& peer) {
+    EXPECT_EQ(peer.read().hello().max_view_phystex(), 512u);
+    auto e = welcome();
+    e.mutable_welcome()->set_view_phystex(1024);
+    peer.send(e);
+  });
+  auto options = to(server.port);
+  options.max_view_phystex = 512;
+  const auto connection = Connection::open(options);
+  ASSERT_FALSE(connection);
+  EXPECT_NE(connection.error().message.find("private layer"), std::string::npos);
+}
+
 TEST(Connection, CamerasGoByAuthenticatedDatagramWhereOffered) {
   const int udp = ::socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in address{};
