@@ -49,7 +49,7 @@ std::shared_ptr<const TileImage> grey_tile(std::uint8_t level) {
 ComposeFrame compose(FrameNumber number, bool key, SlotIndex slot = 0) {
   ComposeFrame c(number, key);
   c.writes.push_back({slot, grey_tile(static_cast<std::uint8_t>(50 + number))});
-  c.edits.push_back({TileId(0, 5), slot, nullptr});
+  c.edits.push_back({TileId(0, 5), slot, nullptr, nullptr});
   c.error = 0.25f;
   ViewAnswer answer;
   answer.session = SessionId{2};
