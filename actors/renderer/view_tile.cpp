@@ -12,7 +12,7 @@
 namespace darm::renderer {
 namespace {
 
-constexpr float kTamedUpTo = 256;         // samples; see tamed()
+constexpr float kTamedUpTo = 1024;        // samples; see tamed()
 constexpr float kTamedFloor = 0.02f;      // linear display value below which nothing is an outlier
 constexpr float kPedestal = 0.01f;        // linear display value
 constexpr float kWideLobe = 0.2f;         // GGX alpha from which neighbouring texels reflect much the same
@@ -121,7 +121,8 @@ bool ViewTile::picture_due(const ViewTileOptions& options) const {
 }
 
 // A lone bright texel among few samples is held to a multiple of its brightest neighbour, for the picture alone; the
-// multiple grows with the samples until it stands for itself (as for the shared light: outliers.hpp).
+// multiple grows with the samples until it stands for itself. As for the shared light (outliers.hpp), but slower: paths
+// begin at a mirror, so that rare bright ones are commoner, and no filter spreads them.
 glm::vec3 ViewTile::tamed(int at) const {
   const auto& texel = texels_[static_cast<std::size_t>(at)];
   if (texel.count >= kTamedUpTo) return texel.mean;
@@ -134,7 +135,7 @@ glm::vec3 ViewTile::tamed(int at) const {
       if ((i != x || j != y) && other.shown) most = std::max(most, luminance(other.mean));
     }
   const float own = luminance(texel.mean);
-  const float limit = (2.0f + texel.count / 8.0f) * most;
+  const float limit = (2.0f + texel.count / 32.0f) * most;
   return own > limit && most > 0 ? texel.mean * (limit / own) : texel.mean;
 }
 
