@@ -139,8 +139,9 @@ glm::vec3 ViewTile::tamed(int at) const {
   return own > limit && most > 0 ? texel.mean * (limit / own) : texel.mean;
 }
 
-// A wide lobe reflects smoothly: while samples are few the picture is of the mean around each texel. Gone with 256. What
-// a mirror shows is noise at a sample or two, and the eye that has so few is moving: there a blur of a pixel is better.
+// A wide lobe reflects smoothly: while samples are few the picture is of the mean around each texel. Gone with 256.
+// What a mirror shows is noise at a sample or two, and the eye that has so few is moving: there a blur of a pixel is
+// better.
 int ViewTile::filter_radius() const {
   if (alpha_ < kWideLobe) return mean_ < 2 ? 2 : mean_ < 8 ? 1 : 0;
   return mean_ < 64 ? 2 : mean_ < 256 ? 1 : 0;

@@ -111,12 +111,23 @@ void TileSchedulerActor::on(KeyFrameWanted&& message) {
   auto* session = find(message.session);
   if (session == nullptr) return;
   if (message.layer == StreamLayer::kView) {
-    if (!session->view_layer) return;
-    session->view_layer->stream().want_key();
-    return compose_view(*session);
+    force_view_key(*session);
+    if (session->view_key_put_off) metrics_.count("darm_view_key_frames_put_off_total");
+    return;
   }
-  session->stream.want_key();
-  if (session->set.passes() > 0) compose(*session);
+  force_key(*session);
+  if (session->key_put_off)
+    metrics_.count("darm_key_frames_put_off_total", 1);
+  else if (session->set.passes() > 0)
+    compose(*session);
+}
+
+// Makes the session's next frame a key frame, unless it had one on demand just now: then a later tick does.
+void TileSchedulerActor::force_key(Session& session) {
+  session.key_put_off = session.key_forced_at && now_us() - *session.key_forced_at < options_.key_interval;
+  if (session.key_put_off) return;
+  session.key_forced_at = now_us();
+  session.stream.want_key();
 }
 
 void TileSchedulerActor::on(TilesShaded&& message) {
@@ -174,9 +185,11 @@ void TileSchedulerActor::on(Tick&&) {
     } else if (pictures_came_ && session->set.passes() > 0) {
       grant_available(session->demand, layout_->coarse_level(), session->stream.table(), images(), options_.allocation);
     }
+    if (session->key_put_off) force_key(*session);
     if (session->view_layer && session->view_layer->expire(now_us())) reallocate_view(*session);
     start_view(*session);
     if (session->set.passes() > 0) compose(*session);
+    if (session->view_key_put_off) force_view_key(*session);
     compose_view(*session);
   }
   pictures_came_ = false;
@@ -325,6 +338,17 @@ void TileSchedulerActor::send_view_work(const Session& session) {
   if (coarse_ == nullptr || !session.posed) return;
   const glm::vec3 eye(session.posed->camera.position - rays_->scene().origin);
   peers_->view_renderer().tell(renderer::ShadeView(session.id, eye, session.view_layer->requests()));
+}
+
+// As force_key(), for the private layer.
+void TileSchedulerActor::force_view_key(Session& session) {
+  if (!session.view_layer) return;
+  const auto last = session.view_key_forced_at;
+  session.view_key_put_off = last && now_us() - *last < options_.key_interval;
+  if (session.view_key_put_off) return;
+  session.view_key_forced_at = now_us();
+  session.view_layer->stream().want_key();
+  compose_view(session);
 }
 
 void TileSchedulerActor::compose_view(Session& session) {

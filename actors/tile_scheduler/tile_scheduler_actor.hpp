@@ -92,12 +92,16 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
     int updates_waited = 0;
-    Microseconds asked_at = 0;               // for the first pictures
+    Microseconds asked_at = 0;  // for the first pictures
+    std::optional<Microseconds> key_forced_at;
+    bool key_put_off = false;                // asked for again too soon after that
     Microseconds weighed_at = 0;             // of demand.target
     bool pictures_since = false;             // some came after that
     std::optional<PrivateLayer> view_layer;  // what depends on its eye
     StreamId view_stream_id{};
     runtime::Ref<encoder::Inbox> view_encoder;  // made with its first frame
+    std::optional<Microseconds> view_key_forced_at;
+    bool view_key_put_off = false;
     Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
     ~Session() {
       if (job) job->cancel();  // it goes with the session, and with the scheduler
@@ -122,6 +126,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void close_view(Session& session);
   void reallocate_view(Session& session);
   void send_view_work(const Session& session);
+  void force_view_key(Session& session);
   void compose_view(Session& session);
 
   std::shared_ptr<const atlas::Layout> layout_;

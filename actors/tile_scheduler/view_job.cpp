@@ -18,19 +18,35 @@ ViewJob::ViewJob(std::uint64_t number, std::shared_ptr<const atlas::Layout> layo
       materials_(std::move(materials)),
       results_(std::clamp(slices, 1u, std::max(1u, block_rows(viewport)))),
       private_(materials_ ? results_.size() : 0),
-      left_(static_cast<unsigned>(results_.size())) {}
+      left_(static_cast<unsigned>(results_.size())) {
+  for (unsigned slice = 0; slice < slice_count(); ++slice) places_.push_back({first_pass, first_row(slice)});
+}
 
-bool ViewJob::run_slice(unsigned slice) {
-  const auto rows = block_rows(sampler_.viewport());
-  const auto count = slice_count();
-  const auto row_of = [&](unsigned s) {
-    return static_cast<std::uint32_t>(static_cast<std::uint64_t>(rows) * s / count);
-  };
+std::uint32_t ViewJob::first_row(unsigned slice) const {
+  return static_cast<std::uint32_t>(std::uint64_t{block_rows(sampler_.viewport())} * slice / slice_count());
+}
+
+ViewJob::Step ViewJob::run_step(unsigned slice) {
   PrivateSamples own;
   if (materials_) own = {*materials_, &private_[slice]};
-  for (int pass = first_pass_; pass < first_pass_ + pass_count_; ++pass)
-    trace_rows(sampler_, pass, row_of(slice), row_of(slice + 1), results_[slice], own);
-  return left_.fetch_sub(1, std::memory_order_acq_rel) == 1;
+  auto& at = places_[slice];
+  const auto end = first_row(slice + 1);
+  const auto rays_per_row = block_columns(sampler_.viewport());
+  std::uint32_t rays = 0;
+  while (at.pass < first_pass_ + pass_count_ && !cancelled_.load(std::memory_order_relaxed)) {
+    if (rays > 0 && rays + rays_per_row > kRaysPerStep) return Step::kMore;
+    trace_rows(sampler_, at.pass, at.row, at.row + 1, results_[slice], own);
+    rays += rays_per_row;
+    if (++at.row < end) continue;
+    ++at.pass;
+    at.row = first_row(slice);
+  }
+  return left_.fetch_sub(1, std::memory_order_acq_rel) == 1 ? Step::kAllDone : Step::kSliceDone;
+}
+
+bool ViewJob::run_slice(unsigned slice) {
+  for (;;)
+    if (const auto step = run_step(slice); step != Step::kMore) return step == Step::kAllDone;
 }
 
 }  // namespace darm::tile_scheduler

@@ -62,6 +62,7 @@ class ViewJob {
   std::shared_ptr<const std::vector<scene::ViewMaterial>> materials_;  // null: nothing private is gathered
   std::vector<VisibleSet> results_;
   std::vector<PrivateSet> private_;
+  std::vector<Place> places_;  // of each slice
   std::atomic<unsigned> left_;
   std::atomic<bool> cancelled_ = false;
 };
