@@ -37,8 +37,12 @@ class CoarseRounds {
 
   /// Jobs worth about `samples` from the current round, which ends with the last of its tiles.
   [[nodiscard]] std::vector<TileJob> next_batch(std::uint64_t samples);
-  /// Every texel has `samples` already: the rounds up to that are over. Call before the first batch.
-  void resume(std::uint32_t samples) { round_ = std::min(samples, rounds_) + 1; }
+  /// There is a picture already, and every texel has `samples`: the rounds up to that are over. Call before the first
+  /// batch.
+  void resume(std::uint32_t samples) {
+    opened_ = true;
+    if (samples > 0) round_ = std::min(samples, rounds_) + 1;
+  }
   /// Call when all jobs handed out are done. True if a picture is due now.
   bool batch_finished();
 

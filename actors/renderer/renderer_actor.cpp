@@ -93,12 +93,13 @@ void RendererActor::resume_coarse() {
   const auto& tiles = coarse_.tiles();
   if (coarse_.finished() || tiles.x == 0) return;
   float least = std::numeric_limits<float>::infinity();
+  bool any = false;
   for (std::uint32_t t = 0; t < tiles.x * tiles.y; ++t) {
     const auto stored = shared_->parts.store->picture(TileId(coarse_.level(), t), shared_->picture_tag);
-    if (!stored) return;
-    least = std::min(least, stored->samples);
+    any = any || stored;
+    least = std::min(least, stored ? stored->samples : 0.0f);
   }
-  if (least < 1) return;
+  if (!any) return;
   coarse_.resume(static_cast<std::uint32_t>(least));
   if (!shared_->parts.coarse) return;
   auto batch = std::make_shared<Batch>();

@@ -41,7 +41,7 @@ for view in "${views[@]}"; do
   serve "$scene" "$file" "$state"
   probe() {
     "$bin/darm-probe" --server "127.0.0.1:$port" --setup "config/scenes/$scene.toml" --camera "$camera" --size 1280x720 \
-      --reference "$reference.pfm" --out "$out/$scene-$camera-$1.png" --json --view-phystex 0 "${@:2}" > "$out/$scene-$camera-$1.json"
+      --view-phystex 0 --reference "$reference.pfm" --out "$out/$scene-$camera-$1.png" --json --view-phystex 0 "${@:2}" > "$out/$scene-$camera-$1.json"
   }
   probe main --seconds "${SECONDS_EACH:-60}" --ceiling-seconds "${CEILING:-15}"
   # Few slots are judged by what converged light would show: the coarser tiles that now matter are lit first.

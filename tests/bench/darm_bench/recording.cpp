@@ -14,6 +14,7 @@ Result<Recording> record(std::uint16_t port, const View& view, double seconds) {
   options.host = "127.0.0.1";
   options.port = port;
   options.name = "darm-bench";
+  options.max_view_phystex = 0;  // the reference is light that does not depend on the eye
   auto connection = Connection::open(options);
   if (!connection) return std::unexpected(connection.error());
   Recording out;

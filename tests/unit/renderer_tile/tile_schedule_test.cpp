@@ -248,6 +248,10 @@ TEST(CoarseRounds, resume_after_the_rounds_that_are_stored) {
   const auto jobs = rounds.next_batch(1);
   ASSERT_FALSE(jobs.empty());
   EXPECT_EQ(jobs[0].most, 17u);
+  CoarseRounds shown(1, {3, 3}, 64);
+  shown.resume(0);  // a picture of what had been lit when it ended
+  EXPECT_FALSE(shown.opening());
+  EXPECT_EQ(shown.next_batch(1)[0].most, 1u);
   CoarseRounds done(1, {3, 3}, 64);
   done.resume(1000);
   EXPECT_TRUE(done.finished());

@@ -81,8 +81,9 @@ TEST_F(Demand, CoarseTexelsUnderTheViewAreAskedForUntilThereIsACoarsePicture) {
   // Every tile of the coarse level that some chain could be served by is among them.
   const int coarse = world_.layout->coarse_level();
   for (const auto& tile : set_.current().tiles())
-    if (tile.level() == coarse && !set_.current().find(tile)->fallback.empty())
+    if (tile.level() == coarse && !set_.current().find(tile)->fallback.empty()) {
       EXPECT_TRUE(tiles.contains(tile.index())) << tile.index();
+    }
   const CoarseLuma luma{2, 2, std::vector<std::uint8_t>(4)};
   EXPECT_TRUE(
       demand_of(set_, *world_.layout, PageTable(64), [this](TileId t) { return find(t); }, &luma, {}).coarse.empty());
