@@ -213,6 +213,9 @@ void Daemon::Parts::spawn_actors() {
     to.tell(encoder::CoarseShaded(std::move(picture)));
     to_scheduler.tell(tile_scheduler::CoarsePictured(luma_of(*from)));
   };
+  parts.light = [view_ref](std::shared_ptr<const renderer::StoredLight> light) {
+    view_ref->get().tell(renderer::LightStored(std::move(light)));
+  };
   renderer_ref->set(system->spawn<renderer::RendererActor>("renderer", 1024, std::move(parts)));
 }
 

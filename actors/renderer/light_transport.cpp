@@ -58,6 +58,7 @@ struct LightTransport::Path {
   bool camera = false;     // sees through the backs of single-sided triangles
   bool suns_done = false;  // the vertex before took its suns by shadow rays alone
   const StoredLight* stored = nullptr;
+  bool sharp_seen = false;  // what it meets is seen in a mirror: sharp light is taken there, not from coarse texels
 };
 
 LightTransport::LightTransport(std::shared_ptr<const scene::Scene> scene, std::shared_ptr<const trace::RayScene> rays,
@@ -224,13 +225,14 @@ glm::vec3 LightTransport::emission_seen(const Path& path, const trace::Surface& 
 // Adds what is stored of the diffuse light of `s`, and takes its lobe out. True: the path ends here. Surfaces that emit
 // are left to the path: their own light is not part of what is stored and would have to be told apart.
 bool LightTransport::end_in_stored_light(Path& path, const trace::Surface& s, const MaterialPoint& m, Bsdf& scatter,
-                                         Sampler& sampler, glm::vec3& light) {
+                                         Sampler& sampler, glm::vec3& light) const {
   const glm::vec3 way = s.position - path.from;
   const float least = path.stored->least_distance();
   if (m.unlit || largest(s.placed->material->emissive) > 0 || glm::dot(way, way) < least * least) return false;
-  glm::vec3 known;
-  if (!path.stored->find(s, sampler.next_2d(), known)) return false;
-  light += path.throughput * scatter.take_diffuse() * known;
+  const StoredTexel* known = path.stored->find(s, sampler.next_2d());
+  if (known == nullptr) return false;
+  const glm::vec3 sharp = path.sharp_seen ? sharp_diffuse(s, sampler) : known->sharp;
+  light += path.throughput * scatter.take_diffuse() * (sharp + known->soft);
   // The other lobes of most surfaces scatter a twentieth of the light: one path in twenty goes on for them.
   const float goes_on = std::min(scatter.scattered(), 1.0f);
   if (!(sampler.next_1d() < goes_on)) return true;
@@ -350,8 +352,8 @@ glm::vec3 LightTransport::transparency(const SurfacePoint& point) const {
   return make_material_point(*scene_, trace::make_surface(*rays_, point)).view_independent_transparency();
 }
 
-ViewDependentLight LightTransport::view_dependent(const SurfacePoint& point, const glm::vec3& eye,
-                                                  Sampler& sampler) const {
+ViewDependentLight LightTransport::view_dependent(const SurfacePoint& point, const glm::vec3& eye, Sampler& sampler,
+                                                  const StoredLight* stored) const {
   const auto s = trace::make_surface(*rays_, point);
   ViewDependentLight made;
   glm::vec3 wo = eye - s.position;
@@ -379,6 +381,8 @@ ViewDependentLight LightTransport::view_dependent(const SurfacePoint& point, con
     path.from = s.position;
     path.pdf = next.pdf;
     path.bounce = 1;
+    path.stored = stored;
+    path.sharp_seen = true;
     light += trace_path(path, sampler);
   }
   made.radiance = finite_or_black(light);

@@ -81,9 +81,10 @@ class LightTransport {
   /// lobes. With it, all light but straight passage is emission + diffuse_factor * (view_independent - emission) +
   /// radiance: the factor is a function of the angle alone, so it is left to who draws, and costs no noise. A texel's
   /// plane may face away from an eye that sees the texel beside: the eye is then mirrored to the front. Volumes without
-  /// a boundary are looked straight through.
-  [[nodiscard]] ViewDependentLight view_dependent(const SurfacePoint& point, const glm::vec3& eye,
-                                                  Sampler& sampler) const;
+  /// a boundary are looked straight through. With `stored`, soft light at the first diffuse surface that it knows is
+  /// taken from there (see soft_light()); sharp light is not, since a mirror would show how coarse its texels are.
+  [[nodiscard]] ViewDependentLight view_dependent(const SurfacePoint& point, const glm::vec3& eye, Sampler& sampler,
+                                                  const StoredLight* stored = nullptr) const;
   /// Share of what is straight behind that a clear surface passes, without Fresnel's term (which needs the eye): tint
   /// of a thin smooth surface, 0 for everything that blurs or bends.
   [[nodiscard]] glm::vec3 clear_tint(const SurfacePoint& point) const;
@@ -115,8 +116,8 @@ class LightTransport {
   template <class Scatter>
   [[nodiscard]] glm::vec3 emitters_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
   [[nodiscard]] glm::vec3 trace_path(Path path, Sampler& sampler) const;
-  [[nodiscard]] static bool end_in_stored_light(Path& path, const trace::Surface& s, const MaterialPoint& m,
-                                                Bsdf& scatter, Sampler& sampler, glm::vec3& light);
+  [[nodiscard]] bool end_in_stored_light(Path& path, const trace::Surface& s, const MaterialPoint& m, Bsdf& scatter,
+                                         Sampler& sampler, glm::vec3& light) const;
   [[nodiscard]] bool next_surface(Path& path, trace::Surface& s, MaterialPoint& m, Sampler& sampler) const;
   [[nodiscard]] glm::vec3 background(const Path& path) const;
   [[nodiscard]] glm::vec3 emission_seen(const Path& path, const trace::Surface& s, const MaterialPoint& m) const;

@@ -371,6 +371,7 @@ void RendererActor::finish_pictures() {
     }
   }
   if (batch_->light) shared_->parts.surfaces->use_stored_light(batch_->light);  // no slice runs now
+  if (batch_->light && shared_->parts.light) shared_->parts.light(batch_->light);
   if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
   begin_batch();
 }

@@ -37,6 +37,8 @@ struct RendererParts {
   runtime::Ref<tile_scheduler::Inbox> scheduler;  ///< gets TilesShaded
   /// Gets each new picture of the coarse level, on the renderer's turn. May be empty.
   std::function<void(std::shared_ptr<const CoarsePicture>)> coarse;
+  /// Gets each new snapshot of stored light, on the renderer's turn. May be empty.
+  std::function<void(std::shared_ptr<const StoredLight>)> light;
   runtime::MetricSink* metrics = nullptr;  ///< must outlive the pool's work; null: none
 };
 

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 #include <memory>
 #include <span>
 #include <vector>
@@ -17,9 +16,12 @@
 
 namespace darm::renderer {
 
-/// One texel: irradiance / pi (nits) of its side of the surface, sharp and soft light together; w is 1 where that is
-/// known, else 0.
-using StoredTexel = glm::vec4;
+/// One texel: irradiance / pi (nits) of its side of the surface, by layer.
+struct StoredTexel {
+  glm::vec3 sharp{0.0f};
+  glm::vec3 soft{0.0f};
+  bool known = false;
+};
 
 /// What a tile of the store holds, as StoredTexels; soft light as filtered in `filtered` (32x32, of a slot with its
 /// border) where that is known.
@@ -35,9 +37,9 @@ class StoredLight {
   void put(std::uint32_t tile_index, std::span<const StoredTexel> texels);
 
   /// Irradiance / pi at a surface point on the side `s.front` says. `xi` in [0, 1)^2 picks one of the four texels
-  /// around it with its bilinear weight, so that the mean over xi is the bilinear value for the price of one. False:
-  /// not known (no texels on that side, not lit yet); `light` is then left alone.
-  [[nodiscard]] bool find(const trace::Surface& s, const glm::vec2& xi, glm::vec3& light) const;
+  /// around it with its bilinear weight, so that the mean over xi is the bilinear value for the price of one. Null:
+  /// not known (no texels on that side, not lit yet).
+  [[nodiscard]] const StoredTexel* find(const trace::Surface& s, const glm::vec2& xi) const;
 
   /// A ray shorter than this ends too near its start for texels of the coarse level: corners and contacts would smear.
   [[nodiscard]] float least_distance() const { return least_distance_; }

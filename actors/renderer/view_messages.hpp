@@ -40,6 +40,15 @@ struct ViewSliceFinished {
   explicit ViewSliceFinished(std::uint64_t number) : batch(number) {}
 };
 
-using ViewInbox = std::variant<ShadeView, ViewSliceFinished>;
+class StoredLight;
+
+/// The renderer knows the coarse level better: from the next batch on, paths behind a reflection end in this.
+struct LightStored {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
+  std::shared_ptr<const StoredLight> light;
+  explicit LightStored(std::shared_ptr<const StoredLight> snapshot) : light(std::move(snapshot)) {}
+};
+
+using ViewInbox = std::variant<ShadeView, LightStored, ViewSliceFinished>;
 
 }  // namespace darm::renderer

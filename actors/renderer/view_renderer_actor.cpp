@@ -12,6 +12,7 @@ struct ViewRendererActor::Job {
   SessionId session{};
   TileId tile;
   std::shared_ptr<ViewTile> state;
+  std::shared_ptr<const StoredLight> stored;
   std::uint32_t passes = 1;
   std::uint32_t cost = 0;
   // results
@@ -72,6 +73,8 @@ void ViewRendererActor::take(const ShadeView& wish) {
   tiles = std::move(kept);
 }
 
+void ViewRendererActor::on(LightStored&& message) { stored_ = std::move(message.light); }
+
 // The first pass over what is new first, by share and by how long it has waited (an eye that never rests would else
 // starve the last); then where share times the fall of squared error per sample is most.
 void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, Batch& batch) {
@@ -99,6 +102,7 @@ void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, B
     job.session = session;
     job.tile = c.tile;
     job.state = c.held->tile;
+    job.stored = stored_;
     job.passes = std::clamp(parts_->options.job_samples / wanted, 1u, static_cast<std::uint32_t>(doubling));
     job.cost = job.passes * wanted;
     budget -= job.cost;
@@ -144,7 +148,7 @@ void ViewRendererActor::post(const std::shared_ptr<Batch>& batch) {
 void ViewRendererActor::run(const ViewRendererParts& parts, Job& job) {
   const auto began = std::chrono::steady_clock::now();
   try {
-    const auto surface = parts.surfaces->tile(job.tile);
+    const auto surface = parts.surfaces->tile(job.tile, job.stored);
     if (!surface) return;
     job.samples = job.state->shade(*surface, job.passes);
     if (job.state->picture_due(parts.options.tile)) job.picture = job.state->draw(*surface);

@@ -37,6 +37,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
  public:
   ViewRendererActor(runtime::Context<ViewInbox> context, ViewRendererParts parts);
   void on(ShadeView&& message);
+  void on(LightStored&& message);
   void on(ViewSliceFinished&& message);
 
  private:
@@ -66,6 +67,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
   std::shared_ptr<const ViewRendererParts> parts_;
   std::map<SessionId, View> views_;
   std::map<SessionId, ShadeView> wishes_;
+  std::shared_ptr<const StoredLight> stored_;
   std::shared_ptr<Batch> batch_;  // null: idle
   std::uint64_t batch_number_ = 0;
   std::size_t slices_left_ = 0;

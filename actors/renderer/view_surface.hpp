@@ -31,8 +31,9 @@ class ViewSurface {
 class ViewSurfaces {
  public:
   virtual ~ViewSurfaces() = default;
-  /// Null outside the level.
-  [[nodiscard]] virtual std::unique_ptr<ViewSurface> tile(TileId id) const = 0;
+  /// Null outside the level. Paths behind its reflections end in `stored`, if there is any.
+  [[nodiscard]] virtual std::unique_ptr<ViewSurface> tile(TileId id,
+                                                          std::shared_ptr<const StoredLight> stored) const = 0;
 };
 
 }  // namespace darm::renderer

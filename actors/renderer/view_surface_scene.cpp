@@ -33,8 +33,8 @@ struct World {
 
 class SceneSlot : public ViewSurface {
  public:
-  SceneSlot(TileId id, LevelTiles level, std::shared_ptr<const World> world)
-      : id_(id), level_(level), world_(std::move(world)) {}
+  SceneSlot(TileId id, LevelTiles level, std::shared_ptr<const World> world, std::shared_ptr<const StoredLight> stored)
+      : id_(id), level_(level), world_(std::move(world)), stored_(std::move(stored)) {}
 
   [[nodiscard]] std::uint32_t patch(int at) override {
     const auto place = place_of(at);
@@ -47,7 +47,7 @@ class SceneSlot : public ViewSurface {
                     hash_pair(id_.packed, static_cast<std::uint32_t>(at)), sample);
     const auto point = covered_point(at, sampler);
     if (!point) return std::nullopt;
-    return world_->transport->view_dependent(*point, eye, sampler);
+    return world_->transport->view_dependent(*point, eye, sampler, stored_.get());
   }
 
   [[nodiscard]] std::shared_ptr<const ThroughTile> through() override {
@@ -113,6 +113,7 @@ class SceneSlot : public ViewSurface {
   TileId id_;
   LevelTiles level_;
   std::shared_ptr<const World> world_;
+  std::shared_ptr<const StoredLight> stored_;
   std::array<std::shared_ptr<const atlas::TileTexels>, 9> around_;
   std::array<bool, 9> asked_{};
 };
@@ -120,12 +121,12 @@ class SceneSlot : public ViewSurface {
 class SceneSlots : public ViewSurfaces {
  public:
   explicit SceneSlots(std::shared_ptr<const World> world) : world_(std::move(world)) {}
-  [[nodiscard]] std::unique_ptr<ViewSurface> tile(TileId id) const override {
+  [[nodiscard]] std::unique_ptr<ViewSurface> tile(TileId id, std::shared_ptr<const StoredLight> stored) const override {
     const auto& levels = world_->mapper->layout().levels;
     if (static_cast<std::size_t>(id.level()) >= levels.size()) return nullptr;
     const auto& level = levels[static_cast<std::size_t>(id.level())];
     if (id.index() >= level.tiles_x * level.tiles_y) return nullptr;
-    return std::make_unique<SceneSlot>(id, LevelTiles{level.tiles_x, level.tiles_y}, world_);
+    return std::make_unique<SceneSlot>(id, LevelTiles{level.tiles_x, level.tiles_y}, world_, std::move(stored));
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/stored_light.hpp"
 #include "actors/runtime/deterministic_system.hpp"
 #include "tests/unit/renderer_tile/made_up_view.hpp"
 
@@ -103,6 +104,17 @@ TEST_F(ViewRendererActorTest, work_ends_with_the_samples_and_a_session_that_leav
   system.run_until_idle();
   look(ann, {0.5f, 0.5f, 0.5f});
   EXPECT_EQ(metrics.counts["darm_view_samples_total"], 4.0 * kSlotTexels * 8) << "begun anew";
+}
+
+TEST_F(ViewRendererActorTest, paths_end_in_the_newest_stored_light) {
+  look(ann, {0.5f, 0.5f, 0.5f});
+  EXPECT_EQ(slots->stored, nullptr);
+  auto layout = std::make_shared<atlas::Layout>();
+  layout->levels.emplace_back().density = 1;
+  const auto light = std::make_shared<const StoredLight>(layout);
+  renderer.tell(LightStored(light));
+  look(ann, {0.9f, 0.5f, 0.5f});
+  EXPECT_EQ(slots->stored, light);
 }
 
 TEST_F(ViewRendererActorTest, without_sessions_nothing_is_done_at_all) {

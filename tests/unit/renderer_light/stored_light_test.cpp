@@ -40,18 +40,19 @@ struct Room {
 
 const SurfacePoint kFloor{0, 0, 0.4f, 0.25f, true};
 
+StoredTexel soft(float light) { return {glm::vec3(0.0f), glm::vec3(light), true}; }
 scene::Material matte(float albedo) { return HandScene::matte(glm::vec3(albedo)); }
 
 TEST(StoredLight, EveryPointOfALitSurfaceIsKnown) {
   const Room room(matte(0.5f));
-  const auto light = room.lit({1, 2, 3, 1});
+  const auto light = room.lit({glm::vec3(1, 0, 2), glm::vec3(0, 2, 1), true});
   for (std::uint32_t instance = 0; instance < room.scene->instances.size(); ++instance)
     for (const auto& [u, v] : {std::pair{0.01f, 0.01f}, {0.98f, 0.01f}, {0.01f, 0.98f}, {0.3f, 0.3f}})
       for (const float xi : {0.0f, 0.999f}) {
         const auto s = trace::make_surface(*room.rays, SurfacePoint{instance, 0, u, v, true});
-        glm::vec3 found(0.0f);
-        ASSERT_TRUE(light.find(s, {xi, xi}, found)) << instance << " " << u << " " << v << " " << xi;
-        EXPECT_EQ(found, glm::vec3(1, 2, 3));
+        const auto* found = light.find(s, {xi, xi});
+        ASSERT_NE(found, nullptr) << instance << " " << u << " " << v << " " << xi;
+        EXPECT_EQ(found->sharp + found->soft, glm::vec3(1, 2, 3));
       }
 }
 
@@ -59,30 +60,52 @@ TEST(StoredLight, WhatIsNotLightIsNotKnown) {
   const Room room(matte(0.5f));
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
   const auto s = trace::make_surface(*room.rays, kFloor);
-  for (const StoredTexel& bad : {StoredTexel(1, 2, 3, 0), StoredTexel(nan, 0, 0, 1), StoredTexel(0, inf, 0, 1),
-                                 StoredTexel(0, 0, -1, 1), StoredTexel(1, 1, 1, nan)}) {
-    glm::vec3 found(7.0f);
-    EXPECT_FALSE(room.lit(bad).find(s, {0.5f, 0.5f}, found));
-    EXPECT_EQ(found, glm::vec3(7.0f)) << "left alone";
-  }
+  const glm::vec3 one(1.0f);
+  for (const StoredTexel& bad :
+       {StoredTexel{one, one, false}, StoredTexel{{nan, 0, 0}, one, true}, StoredTexel{one, {0, inf, 0}, true},
+        StoredTexel{{0, 0, -1}, one, true}, StoredTexel{one, {0, -1e-9f, 0}, true}})
+    EXPECT_EQ(room.lit(bad).find(s, {0.5f, 0.5f}), nullptr);
 }
 
 TEST(StoredLight, TheOtherSideIsNotThisOne) {
   const Room room(matte(0.5f));
   auto s = trace::make_surface(*room.rays, kFloor);
   s.front = false;  // single-sided: the back has no texels
-  glm::vec3 found(0.0f);
-  EXPECT_FALSE(room.lit(StoredTexel(1.0f)).find(s, {0.5f, 0.5f}, found));
+  EXPECT_EQ(room.lit(soft(1.0f)).find(s, {0.5f, 0.5f}), nullptr);
 }
 
 TEST(StoredLight, APathEndsInItAtTheFirstDiffuseSurface) {
   const Room room(matte(0.5f));
-  const auto light = room.lit(StoredTexel(2.0f));
+  const auto light = room.lit(soft(2.0f));
   for (std::uint32_t i = 0; i < 200; ++i) {
     Sampler sampler(3, 7, i);
     const float soft = room.transport->soft_light(kFloor, sampler, &light).x;
     // Near the corners a ray is too short for coarse texels and goes on: then it meets the next wall's.
     EXPECT_TRUE(std::abs(soft - 1.0f) < 1e-5f || soft <= 0.5f + 1e-5f) << soft;
+  }
+}
+
+TEST(StoredLight, AMirrorTakesItsSoftLightAndLooksForSharpLightItself) {
+  auto mirror = HandScene::matte(glm::vec3(1.0f));
+  mirror.metallic = 1;
+  mirror.roughness = 0;
+  HandScene hand;
+  hand.box(glm::vec3(-2), glm::vec3(2), hand.material(matte(0.5f)), true);
+  hand.box(glm::vec3(-0.2f, -2.0f, -0.2f), glm::vec3(0.2f, -1.9f, 0.2f), hand.material(mirror), false);
+  const auto scene = hand.share();
+  const auto rays = trace::RayScene::build(scene, 1).value();
+  const LightTransport transport(scene, rays);
+  const auto layout = atlas::build_layout(*scene, {.q = 16}).value();
+  StoredLight light(layout);
+  const std::vector<StoredTexel> tile(kTileTexels, {glm::vec3(100.0f), glm::vec3(2.0f), true});
+  for (std::uint32_t t = 0; t < layout->levels.back().tiles_x * layout->levels.back().tiles_y; ++t) light.put(t, tile);
+  trace::Hit hit;
+  ASSERT_TRUE(rays->closest({{0.05f, 0.0f, 0.03f}, 0.0f, {0, -1, 0}, 10.0f}, hit));  // down to the mirror's top
+  const SurfacePoint point{hit.instance, hit.triangle, hit.u, hit.v, hit.front};
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    Sampler sampler(9, 1, i);
+    // It sees the far ceiling: 0.5 * (soft 2 + no sharp, for there is no lamp), not the 100 of coarse sharp light.
+    EXPECT_NEAR(transport.view_dependent(point, {0.05f, 1.0f, 0.03f}, sampler, &light).radiance.x, 1.0f, 0.02f);
   }
 }
 
@@ -106,7 +129,7 @@ TEST(StoredLight, WhatACoatReflectsIsNotLost) {
   coated.ior = 1.5f;
   coated.roughness = 0.3f;
   const Room room(coated);
-  const auto stored = room.lit(StoredTexel(1.0f));
+  const auto stored = room.lit(soft(1.0f));
   double mean = 0, m2 = 0;
   constexpr std::uint32_t kSamples = 200000;
   for (std::uint32_t i = 0; i < kSamples; ++i) {

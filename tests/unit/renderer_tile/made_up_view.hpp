@@ -39,7 +39,9 @@ class MadeUpSlot : public ViewSurface {
 class MadeUpSlots : public ViewSurfaces {
  public:
   MadeUpView world;
-  [[nodiscard]] std::unique_ptr<ViewSurface> tile(TileId id) const override {
+  mutable std::shared_ptr<const StoredLight> stored;  ///< that the last tile was asked for with
+  [[nodiscard]] std::unique_ptr<ViewSurface> tile(TileId id, std::shared_ptr<const StoredLight> light) const override {
+    stored = std::move(light);
     return std::make_unique<MadeUpSlot>(id, world);
   }
 };
