@@ -29,6 +29,7 @@ class FakeViewRenderer : public runtime::Actor<renderer::ViewInbox> {
   FakeViewRenderer(runtime::Context<renderer::ViewInbox> context, Heard* heard)
       : Actor(std::move(context)), heard_(heard) {}
   void on(renderer::ShadeView&& m) { heard_->views.push_back(m); }
+  void on(renderer::LightStored&&) {}
   void on(renderer::ViewSliceFinished&&) {}
 
  private:
