@@ -47,7 +47,7 @@ Around look_around(const FilterWindow& w) {
 
 }  // namespace
 
-float outlier_bound(float count) { return 2.0f + 24.0f / count + count / 8.0f; }
+float outlier_bound(float count) { return 2.0f + 24.0f / count + count / 64.0f; }
 
 void tame_outliers(FilterWindow& w) {
   const Around around = look_around(w);  // judged by what was measured, not by what was tamed

@@ -6,10 +6,10 @@
 namespace darm::renderer {
 
 /// Samples from which a texel is left as it is.
-inline constexpr float kOutlierSamples = 256;
+inline constexpr float kOutlierSamples = 1024;
 
 /// How many times the mean of its neighbours (5x5, same patch, itself left out) a texel of `count` samples may shine:
-/// 2 + 24 / count + count / 8. One sample may be many times the mean and still be what light is like there (a window
+/// 2 + 24 / count + count / 64. One sample may be many times the mean and still be what light is like there (a window
 /// that one direction in twenty meets): held to twice its neighbours it costs Sponza's atrium 4 dB. In the limit
 /// nothing is held down; what is held down meanwhile darkens the picture, never the store.
 [[nodiscard]] float outlier_bound(float count);

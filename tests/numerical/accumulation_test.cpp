@@ -229,14 +229,14 @@ TEST_F(Accumulation, what_is_no_light_is_counted_and_never_stored) {
       }
 }
 
-// The picture's bound on lone bright texels: exactly 2 + 24 / n + n / 8 times the neighbours' mean, darkening only,
-// nothing from 256 samples on. The store has no part in it.
+// The picture's bound on lone bright texels: exactly 2 + 24 / n + n / 64 times the neighbours' mean, darkening only,
+// nothing from 1024 samples on. The store has no part in it.
 TEST(Fireflies, are_held_to_the_stated_bound_and_to_nothing_else) {
   Worst over("fireflies: brightness over the stated bound, relative", 1e-5);
   Worst brighter("fireflies: texels made brighter, or dimmed without need", 0);
   std::mt19937 random(4);
   std::lognormal_distribution<float> light(0.0f, 2.0f);
-  for (const float samples : {1.0f, 4.0f, 32.0f, 255.0f, 256.0f, 4096.0f}) {
+  for (const float samples : {1.0f, 4.0f, 32.0f, 255.0f, 1023.0f, 1024.0f, 4096.0f}) {
     renderer::FilterWindow window;
     window.reset(4);
     const int size = window.size;
@@ -261,11 +261,11 @@ TEST(Fireflies, are_held_to_the_stated_bound_and_to_nothing_else) {
             ++n;
           }
         const auto at = static_cast<std::size_t>(y * size + x);
-        const double bound = (2 + 24 / double{samples} + double{samples} / 8) * sum / n;
+        const double bound = (2 + 24 / double{samples} + double{samples} / 64) * sum / n;
         const double was = before[at], is = window.grey[at];
-        brighter.see(is > was || (is < was && (samples >= 256 || was < bound * (1 - 1e-5))) ? 1 : 0, "samples",
+        brighter.see(is > was || (is < was && (samples >= 1024 || was < bound * (1 - 1e-5))) ? 1 : 0, "samples",
                      samples);
-        if (samples < 256) over.see(is / bound - 1, "samples", samples);
+        if (samples < 1024) over.see(is / bound - 1, "samples", samples);
       }
   }
 }
