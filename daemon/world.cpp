@@ -41,8 +41,12 @@ Result<void> make_state_dir(const std::filesystem::path& dir) {
   return {};
 }
 
-/// What the stored light depends on beside scene and layout: the sample sequences and what a sample means.
+/// What the stored light depends on beside scene and layout: the sample sequences, what a sample means, and where paths
+/// ended: light that was taken from other light must not stand for traced light.
 constexpr std::uint64_t kLightVersion = 2;
+std::uint64_t light_key(const config::Config& config) {
+  return kLightVersion * 2 + (config.accuracy.indirect == "traced" ? 1 : 0);
+}
 
 }  // namespace
 
@@ -94,7 +98,7 @@ Result<World> build_world(const config::Config& config, unsigned threads) {
   spdlog::info("geometry: {} chunks, {:.2f} MB in {:.2f} s, exposure {:.4g}", world.geometry->chunk_count(),
                static_cast<double>(world.geometry->total_bytes()) * 1e-6, seconds_since(start), world.exposure);
 
-  auto store = atlas::RadianceStore::open(config.state.dir, {world.scene->hash, world.layout->hash, kLightVersion},
+  auto store = atlas::RadianceStore::open(config.state.dir, {world.scene->hash, world.layout->hash, light_key(config)},
                                           *world.layout, {config.state.max_store_bytes});
   if (!store) return std::unexpected(store.error());
   world.store = std::move(*store);

@@ -24,6 +24,19 @@ class Restart(unittest.TestCase):
             self.assertGreater(tiles, 50)
             self.assertGreater(after["series"][0]["psnr"], before["psnr"] - 0.5)
 
+    def test_traced_light_is_not_taken_from_stored_light(self):
+        with Folder() as folder:
+            state = Path(folder) / "state"
+            daemon = Daemon(state)
+            probe(daemon.tcp, Path(folder) / "lit.png", "--seconds", "2")
+            self.assertEqual(daemon.stop(), 0)
+            preset = Path(folder) / "reference.toml"
+            preset.write_text('[accuracy]\npreset = "reference"\n')
+            daemon = Daemon(state, "--config", preset)
+            tiles = int(re.search(r"radiance store: (\d+) tiles", daemon.messages()).group(1))
+            self.assertEqual(daemon.stop(), 0)
+            self.assertEqual(tiles, 0)
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
