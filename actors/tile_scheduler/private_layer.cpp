@@ -57,15 +57,7 @@ void PrivateLayer::reallocate(const AllocationOptions& options, int coarse_level
   chain_shares_.clear();
   chains_ = join(current_, previous_, options_.previous_weight, chain_shares_);
   losses_.assign(chains_.size(), options_.loss);
-  AllocationRequest request;
-  const auto residents = stream_.table().residents();
-  request.chains = chains_;
-  request.losses = losses_;
-  request.residents = residents;
-  request.slots = stream_.table().capacity();
-  request.coarse_level = coarse_level;
-  request.exchange = false;
-  target_ = allocate_slots(request, options);
+  target_ = allocate(nullptr);
   const auto share = shares();
   auto requests = std::make_shared<std::vector<renderer::ViewTileRequest>>();
   requests->reserve(target_.tiles.size());
@@ -80,6 +72,19 @@ void PrivateLayer::reallocate(const AllocationOptions& options, int coarse_level
   }
   requests_ = std::move(requests);
   grant();
+}
+
+Allocation PrivateLayer::allocate(const std::function<bool(TileId)>& available) const {
+  const auto residents = stream_.table().residents();
+  AllocationRequest request;
+  request.chains = chains_;
+  request.losses = losses_;
+  request.residents = residents;
+  request.available = available;
+  request.slots = stream_.table().capacity();
+  request.coarse_level = coarse_level_;
+  request.exchange = false;
+  return allocate_slots(request, allocation_);
 }
 
 // Share of the picture that each target tile serves.
@@ -105,16 +110,7 @@ void PrivateLayer::grant() {
     granted_ = target_.tiles;
     return;
   }
-  AllocationRequest request;
-  const auto residents = stream_.table().residents();
-  request.chains = chains_;
-  request.losses = losses_;
-  request.residents = residents;
-  request.slots = stream_.table().capacity();
-  request.coarse_level = coarse_level_;
-  request.exchange = false;
-  request.available = has;
-  granted_ = allocate_slots(request, allocation_).tiles;
+  granted_ = allocate(has).tiles;
 }
 
 void PrivateLayer::put(const std::vector<ShadedTile>& tiles) {

@@ -46,6 +46,7 @@ class PrivateLayer {
   [[nodiscard]] std::size_t target_size() const { return target_.tiles.size(); }
 
  private:
+  [[nodiscard]] Allocation allocate(const std::function<bool(TileId)>& available) const;
   void grant();
   [[nodiscard]] std::vector<float> shares() const;
 
