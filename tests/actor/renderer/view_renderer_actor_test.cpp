@@ -8,6 +8,7 @@
 #include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/stored_light.hpp"
 #include "actors/runtime/deterministic_system.hpp"
+#include "tests/actor/renderer/counting_metrics.hpp"
 #include "tests/unit/renderer_tile/made_up_view.hpp"
 
 namespace darm::renderer {
@@ -28,14 +29,6 @@ class Listener : public runtime::Actor<tile_scheduler::Inbox> {
 
  private:
   Pictures* heard_;
-};
-
-class CountingMetrics : public runtime::MetricSink {
- public:
-  void count(std::string_view name, double n, runtime::Labels) override { counts[std::string(name)] += n; }
-  void observe(std::string_view, double, runtime::Labels) override {}
-  void set(std::string_view, double, runtime::Labels) override {}
-  std::map<std::string, double> counts;
 };
 
 class ViewRendererActorTest : public ::testing::Test {

@@ -5,41 +5,13 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/unit/renderer_light/estimate.hpp"
 #include "tests/unit/trace/hand_scene.hpp"
 
 namespace darm::renderer {
 namespace {
 
 using test::HandScene;
-
-struct Estimate {
-  double mean = 0;
-  double error = 0;  // standard error of the mean
-};
-
-Estimate estimate(std::uint32_t samples, const std::function<float(Sampler&)>& draw, std::uint64_t seed = 1) {
-  double mean = 0, m2 = 0;
-  for (std::uint32_t i = 0; i < samples; ++i) {
-    // A pixel of its own for every 64 samples: independent runs, whose spread is an honest error.
-    Sampler sampler(seed, hash_pair(i / 64, 3), i % 64);
-    const double x = draw(sampler);
-    EXPECT_TRUE(std::isfinite(x)) << "sample " << i;
-    const double delta = x - mean;
-    mean += delta / (i + 1);
-    m2 += delta * (x - mean);
-  }
-  return {mean, std::sqrt(m2 / samples / samples)};
-}
-
-// Five standard errors: a correct estimator fails with a probability of 6e-7.
-void expect_agrees(const Estimate& e, double truth, double slack = 1e-4) {
-  EXPECT_NEAR(e.mean, truth, 5 * e.error + slack * std::abs(truth));
-}
-
-LightTransport transport_of(const HandScene& hand, TransportOptions options = {}) {
-  const auto scene = hand.share();
-  return {scene, trace::RayScene::build(scene, 1).value(), options};
-}
 
 const SurfacePoint kFloor{0, 0, 0.5f, 0.25f, true};
 

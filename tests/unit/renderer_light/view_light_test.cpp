@@ -6,35 +6,13 @@
 
 #include "actors/renderer/light_transport.hpp"
 #include "actors/renderer/sampling.hpp"
+#include "tests/unit/renderer_light/estimate.hpp"
 #include "tests/unit/trace/hand_scene.hpp"
 
 namespace darm::renderer {
 namespace {
 
 using test::HandScene;
-
-struct Estimate {
-  double mean = 0;
-  double error = 0;  // standard error of the mean
-};
-
-Estimate estimate(std::uint32_t samples, const std::function<double(Sampler&)>& draw, std::uint64_t seed = 1) {
-  double mean = 0, m2 = 0;
-  for (std::uint32_t i = 0; i < samples; ++i) {
-    Sampler sampler(seed, hash_pair(i / 64, 3), i % 64);
-    const double x = draw(sampler);
-    EXPECT_TRUE(std::isfinite(x)) << "sample " << i;
-    const double delta = x - mean;
-    mean += delta / (i + 1);
-    m2 += delta * (x - mean);
-  }
-  return {mean, std::sqrt(m2 / samples / samples)};
-}
-
-LightTransport transport_of(const HandScene& hand) {
-  const auto scene = hand.share();
-  return {scene, trace::RayScene::build(scene, 1).value()};
-}
 
 const SurfacePoint kFloor{0, 0, 0.5f, 0.25f, true};
 
