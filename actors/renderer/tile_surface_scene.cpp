@@ -3,42 +3,18 @@
 #include <algorithm>
 
 #include "actors/renderer/sampler.hpp"
-#include "actors/scene/texture_sampling.hpp"
+#include "actors/renderer/surface_world.hpp"
 
 namespace darm::renderer {
 
 namespace {
 
-constexpr int kTriesForCover = 8;
 constexpr std::uint64_t kAlbedoSeed = 0xa1bed0;
 constexpr std::uint64_t kSoftSeed = 0x50f7;  // the two layers draw apart
 
-struct World {
-  std::shared_ptr<const scene::Scene> scene;
-  std::shared_ptr<const atlas::TexelMapper> mapper;
-  std::shared_ptr<const LightTransport> transport;
-  std::uint64_t seed = 0;
-
-  [[nodiscard]] const scene::Material& material_of(std::uint32_t instance) const {
-    return scene->materials[scene->meshes[scene->instances[instance].mesh].material];
-  }
-
-  // 1 unless MASK or BLEND. MASK: 0 or 1.
-  [[nodiscard]] float alpha(const SurfacePoint& p) const {
-    const auto& mesh = scene->meshes[scene->instances[p.instance].mesh];
-    const auto& m = scene->materials[mesh.material];
-    if (m.alpha_mode == scene::AlphaMode::kOpaque) return 1.0f;
-    float a = m.base_color.w * scene::interpolate_color(mesh, p.triangle, p.u, p.v).w;
-    if (m.base_color_texture.present())
-      a *= scene::sample(*scene, m.base_color_texture, mesh, p.triangle, p.u, p.v, scene::TextureEncoding::kSrgb).w;
-    if (m.alpha_mode == scene::AlphaMode::kMask) return a >= m.alpha_cutoff ? 1.0f : 0.0f;
-    return std::clamp(a, 0.0f, 1.0f);
-  }
-};
-
 class SceneTile : public TileSurface {
  public:
-  SceneTile(TileId id, std::shared_ptr<const World> world, std::shared_ptr<const StoredLight> stored)
+  SceneTile(TileId id, std::shared_ptr<const SurfaceWorld> world, std::shared_ptr<const StoredLight> stored)
       : id_(id), world_(std::move(world)), stored_(std::move(stored)), texels_(world_->mapper->tile(id)) {}
 
   [[nodiscard]] std::uint32_t patch(int texel) const override {
@@ -98,26 +74,19 @@ class SceneTile : public TileSurface {
   }
 
  private:
-  // A texel half cut away shows the colour of its other half: points that MASK cuts are drawn again.
   [[nodiscard]] std::optional<SurfacePoint> covered_point(int texel, Sampler& sampler) const {
-    const int x = texel % kTileSize;
-    const int y = texel / kTileSize;
-    auto point = texels_->sample(x, y, sampler.next_2d());
-    if (!point || world_->material_of(point->instance).alpha_mode != scene::AlphaMode::kMask) return point;
-    for (int i = 0; i < kTriesForCover && world_->alpha(*point) == 0.0f; ++i)
-      if (const auto again = texels_->sample(x, y, sampler.next_2d())) point = again;
-    return point;
+    return world_->covered_point(*texels_, texel % kTileSize, texel / kTileSize, sampler);
   }
 
   TileId id_;
-  std::shared_ptr<const World> world_;
+  std::shared_ptr<const SurfaceWorld> world_;
   std::shared_ptr<const StoredLight> stored_;
   std::shared_ptr<const atlas::TileTexels> texels_;
 };
 
 class SceneSurfaces : public TileSurfaces {
  public:
-  explicit SceneSurfaces(std::shared_ptr<const World> world) : world_(std::move(world)) {}
+  explicit SceneSurfaces(std::shared_ptr<const SurfaceWorld> world) : world_(std::move(world)) {}
   [[nodiscard]] std::shared_ptr<const TileSurface> tile(TileId id) const override {
     const auto& levels = world_->mapper->layout().levels;
     if (static_cast<std::size_t>(id.level()) >= levels.size()) return nullptr;
@@ -128,7 +97,7 @@ class SceneSurfaces : public TileSurfaces {
   void use_stored_light(std::shared_ptr<const StoredLight> light) override { stored_ = std::move(light); }
 
  private:
-  std::shared_ptr<const World> world_;
+  std::shared_ptr<const SurfaceWorld> world_;
   std::shared_ptr<const StoredLight> stored_;
 };
 
@@ -137,7 +106,7 @@ class SceneSurfaces : public TileSurfaces {
 std::shared_ptr<TileSurfaces> make_scene_surfaces(std::shared_ptr<const scene::Scene> scene,
                                                   std::shared_ptr<const atlas::TexelMapper> mapper,
                                                   std::shared_ptr<const LightTransport> transport, std::uint64_t seed) {
-  auto world = std::make_shared<World>();
+  auto world = std::make_shared<SurfaceWorld>();
   world->scene = std::move(scene);
   world->mapper = std::move(mapper);
   world->transport = std::move(transport);

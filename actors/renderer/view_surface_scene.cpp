@@ -5,35 +5,20 @@
 
 #include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/sampler.hpp"
+#include "actors/renderer/surface_world.hpp"
 #include "actors/renderer/tile_surface.hpp"
-#include "actors/renderer/trace/surface.hpp"
 
 namespace darm::renderer {
 namespace {
 
-constexpr int kTriesForCover = 8;
 constexpr int kThroughPoints = 4;
 constexpr std::uint64_t kThroughSeed = 0xc1ea5;
 constexpr std::uint64_t kViewSeed = 0x71e30000;
 
-struct World {
-  std::shared_ptr<const scene::Scene> scene;
-  std::shared_ptr<const atlas::TexelMapper> mapper;
-  std::shared_ptr<const LightTransport> transport;
-  std::uint64_t seed = 0;
-
-  [[nodiscard]] const scene::Material& material_of(std::uint32_t instance) const {
-    return scene->materials[scene->meshes[scene->instances[instance].mesh].material];
-  }
-  [[nodiscard]] bool cut_away(const SurfacePoint& p) const {
-    const auto& placed = transport->rays().instance(p.instance);
-    return trace::surface_alpha(*scene, placed, p.triangle, p.u, p.v) < placed.material->alpha_cutoff;
-  }
-};
-
 class SceneSlot : public ViewSurface {
  public:
-  SceneSlot(TileId id, LevelTiles level, std::shared_ptr<const World> world, std::shared_ptr<const StoredLight> stored)
+  SceneSlot(TileId id, LevelTiles level, std::shared_ptr<const SurfaceWorld> world,
+            std::shared_ptr<const StoredLight> stored)
       : id_(id), level_(level), world_(std::move(world)), stored_(std::move(stored)) {}
 
   [[nodiscard]] std::uint32_t patch(int at) override {
@@ -99,20 +84,15 @@ class SceneSlot : public ViewSurface {
     return {texels(step(y) * 3 + step(x)), (x + kTileSize - 1) % kTileSize, (y + kTileSize - 1) % kTileSize};
   }
 
-  // Points that MASK cuts away are drawn again, as for the shared light.
   std::optional<SurfacePoint> covered_point(int at, Sampler& sampler) {
     const auto place = place_of(at);
     if (place.texels == nullptr) return std::nullopt;
-    auto point = place.texels->sample(place.x, place.y, sampler.next_2d());
-    if (!point || world_->material_of(point->instance).alpha_mode != scene::AlphaMode::kMask) return point;
-    for (int i = 0; i < kTriesForCover && world_->cut_away(*point); ++i)
-      if (const auto again = place.texels->sample(place.x, place.y, sampler.next_2d())) point = again;
-    return point;
+    return world_->covered_point(*place.texels, place.x, place.y, sampler);
   }
 
   TileId id_;
   LevelTiles level_;
-  std::shared_ptr<const World> world_;
+  std::shared_ptr<const SurfaceWorld> world_;
   std::shared_ptr<const StoredLight> stored_;
   std::array<std::shared_ptr<const atlas::TileTexels>, 9> around_;
   std::array<bool, 9> asked_{};
@@ -120,7 +100,7 @@ class SceneSlot : public ViewSurface {
 
 class SceneSlots : public ViewSurfaces {
  public:
-  explicit SceneSlots(std::shared_ptr<const World> world) : world_(std::move(world)) {}
+  explicit SceneSlots(std::shared_ptr<const SurfaceWorld> world) : world_(std::move(world)) {}
   [[nodiscard]] std::unique_ptr<ViewSurface> tile(TileId id, std::shared_ptr<const StoredLight> stored) const override {
     const auto& levels = world_->mapper->layout().levels;
     if (static_cast<std::size_t>(id.level()) >= levels.size()) return nullptr;
@@ -130,7 +110,7 @@ class SceneSlots : public ViewSurfaces {
   }
 
  private:
-  std::shared_ptr<const World> world_;
+  std::shared_ptr<const SurfaceWorld> world_;
 };
 
 }  // namespace
@@ -139,7 +119,7 @@ std::shared_ptr<const ViewSurfaces> make_view_surfaces(std::shared_ptr<const sce
                                                        std::shared_ptr<const atlas::TexelMapper> mapper,
                                                        std::shared_ptr<const LightTransport> transport,
                                                        std::uint64_t seed) {
-  auto world = std::make_shared<World>();
+  auto world = std::make_shared<SurfaceWorld>();
   world->scene = std::move(scene);
   world->mapper = std::move(mapper);
   world->transport = std::move(transport);
