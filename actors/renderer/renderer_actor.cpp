@@ -15,7 +15,7 @@ namespace darm::renderer {
 
 namespace {
 
-constexpr std::size_t kPicturesPerSlice = 24;
+constexpr std::size_t kPicturesPerSlice = 8;
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
 constexpr std::uint64_t kDisplayVersion = 2;
 
@@ -50,6 +50,7 @@ struct RendererActor::Shared {
   explicit Shared(RendererParts p) : parts(std::move(p)) {}
   RendererParts parts;
   TileFactsCache facts;
+  std::shared_ptr<const StoredLight> light;  // of the coarse level; changes between phases
   std::uint64_t picture_tag = picture_tag_of(parts.options.display);
 
   [[nodiscard]] runtime::MetricSink& metrics() const {
@@ -234,7 +235,9 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
     result.shading = *shaded;
   }
   const LevelTiles level = shared.level_of(job.tile);
-  const auto facts = shared.facts.get(job.tile, level, *shared.parts.surfaces, *shared.parts.store);
+  const auto facts = shared.facts.get(job.tile, *shared.parts.surfaces, *shared.parts.store);
+  // CoarseTex has none; a tile of its level that gets a slot learns it then.
+  if (facts && !job.coarse) facts->learn_coverage(job.tile, level, *shared.parts.surfaces);
   const float least = result.shading.progress.least;
   if (!facts || result.shading.progress.mean <= 0) return;
   if (!facts->learn_albedo(*surface, job.mask, least < 1 ? 2 : least < 2 ? 4 : least < 16 ? 16 : 32)) return;
@@ -325,7 +328,7 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
   const TileJob& job = batch.jobs[index];
   auto& store = *shared.parts.store;
   std::optional<TilePicture> picture;
-  TileDisplay display(store, shared.facts, shared.parts.options.display);
+  TileDisplay display(store, shared.facts, shared.parts.options.display, shared.light.get());
   if (job.recall) {
     if (const auto stored = store.picture(job.tile, shared.picture_tag)) picture = from_stored(*stored);
   } else {
@@ -370,7 +373,10 @@ void RendererActor::finish_pictures() {
         for (const TileId t : names) schedule_.forget_picture(t);
     }
   }
-  if (batch_->light) shared_->parts.surfaces->use_stored_light(batch_->light);  // no slice runs now
+  if (batch_->light) {  // no slice runs now
+    shared_->parts.surfaces->use_stored_light(batch_->light);
+    shared_->light = batch_->light;
+  }
   if (batch_->light && shared_->parts.light) shared_->parts.light(batch_->light);
   if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
   begin_batch();

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+
+#include "actors/renderer/sampling.hpp"
 
 namespace darm::renderer {
 
@@ -63,6 +66,47 @@ const StoredTexel* StoredLight::find(const trace::Surface& s, const glm::vec2& x
   if (x >= level.width || y >= level.height) return nullptr;
   const StoredTexel& texel = texels_[y * level.width + x];
   return texel.known ? &texel : nullptr;
+}
+
+std::optional<LightGuess> StoredLight::guess(PatchId patch, int level, const glm::vec2& at) const {
+  const auto& from = layout_->levels[static_cast<std::size_t>(level)];
+  const auto& to = layout_->levels.back();
+  const auto& place = from.placements[index_of(patch)];
+  const auto& coarse = to.placements[index_of(patch)];
+  // A patch of one texel (scale 0) is one at every coarser level.
+  const float ratio = place.scale > 0 ? coarse.scale * to.density / (place.scale * from.density) : 0.0f;
+  const glm::vec2 corner =
+      (at - 0.5f - glm::vec2(place.x, place.y)) * ratio + glm::vec2(coarse.x, coarse.y);  // texel centres at integers
+  const glm::vec2 floor = glm::floor(corner);
+  const glm::vec2 part = corner - floor;
+  LightGuess out;
+  float weight = 0;
+  glm::vec2 pivot(0.0f);  // differences to one of the texels, so that the variance of nearly equal ones is exact
+  glm::vec2 square(0.0f);
+  glm::vec2 mean(0.0f);
+  for (int k = 0; k < 4; ++k) {
+    const float x = floor.x + static_cast<float>(k & 1);
+    const float y = floor.y + static_cast<float>(k >> 1);
+    const float w = ((k & 1) != 0 ? part.x : 1 - part.x) * ((k >> 1) != 0 ? part.y : 1 - part.y);
+    if (!(w > 0) || !(x >= 0 && y >= 0) || x >= static_cast<float>(to.width) || y >= static_cast<float>(to.height))
+      continue;
+    const StoredTexel& texel = texels_[static_cast<std::size_t>(y) * to.width + static_cast<std::size_t>(x)];
+    if (!texel.known) continue;
+    const glm::vec2 grey(luminance(texel.sharp), luminance(texel.soft));
+    if (weight == 0) pivot = grey;
+    weight += w;
+    out.sharp += w * texel.sharp;
+    out.soft += w * texel.soft;
+    mean += w * (grey - pivot);
+    square += w * (grey - pivot) * (grey - pivot);
+  }
+  if (!(weight > 1e-3f)) return std::nullopt;
+  out.sharp /= weight;
+  out.soft /= weight;
+  const glm::vec2 spread = glm::max(square / weight - mean * mean / (weight * weight), glm::vec2(0.0f));
+  out.sharp_spread = spread.x;
+  out.soft_spread = spread.y;
+  return out;
 }
 
 }  // namespace darm::renderer

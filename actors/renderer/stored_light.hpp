@@ -6,12 +6,14 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "actors/atlas/layout.hpp"
 #include "actors/atlas/radiance_store.hpp"
 #include "actors/renderer/filter_irradiance.hpp"
+#include "actors/renderer/light_guess.hpp"
 #include "actors/renderer/trace/surface.hpp"
 
 namespace darm::renderer {
@@ -41,6 +43,12 @@ class StoredLight {
   /// not known (no texels on that side, not lit yet).
   [[nodiscard]] const StoredTexel* find(const trace::Surface& s, const glm::vec2& xi) const;
 
+  /// The bilinear value at texel position `at` (continuous, as Layout::texel_at) of a patch at `level`, out of those of
+  /// its four texels that are known. nullopt: none is. The patch must own the place, its gutter included.
+  [[nodiscard]] std::optional<LightGuess> guess(PatchId patch, int level, const glm::vec2& at) const;
+
+  /// The level it is of.
+  [[nodiscard]] int level() const { return layout_->coarse_level(); }
   /// A ray shorter than this ends too near its start for texels of the coarse level: corners and contacts would smear.
   [[nodiscard]] float least_distance() const { return least_distance_; }
 

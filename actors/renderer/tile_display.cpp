@@ -5,6 +5,7 @@
 
 #include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/outliers.hpp"
+#include "actors/renderer/sampling.hpp"
 #include "actors/renderer/tile_fill.hpp"
 
 namespace darm::renderer {
@@ -15,8 +16,6 @@ using atlas::Plane;
 namespace {
 
 constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
-
-float grey_of(const glm::vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
 struct Step {
@@ -75,14 +74,49 @@ void TileDisplay::gather(int radius) {
       const glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
       window_.count[at] = n;
       for (int c = 0; c < 3; ++c) window_.irradiance[static_cast<std::size_t>(c)][at] = soft[c];
-      window_.grey[at] = grey_of(soft);
+      window_.grey[at] = luminance(soft);
       window_.grey_m2[at] = from.light->plane(Plane::kSoftM2)[texel];
     }
   }
 }
 
-void TileDisplay::shade_slot(std::vector<float>& variance, SlotColours& colours) {
+// Sharp and soft light of a texel as far as it has samples (soft light: or the filter has). Which layers it has.
+TileDisplay::Lit TileDisplay::light_of(const Neighbour& from, int texel, const FilteredTexel& filtered) {
+  Lit lit;
+  if (!from.light) return lit;
+  if (from.light->count(Layer::kSharp, texel) > 0) {
+    lit.has_sharp = true;
+    lit.sharp.mean = from.light->mean(Layer::kSharp, texel);
+    const float grey = luminance(lit.sharp.mean);
+    // One shadow ray a sample: a lone sample is mostly right, its spread is about a third of its value (measured).
+    lit.sharp.variance = from.light->variance_of_mean(Layer::kSharp, texel, kLoneSample * grey * grey);
+  }
+  if (filtered.known) {
+    lit.has_soft = true;
+    lit.soft = {{filtered.irradiance[0], filtered.irradiance[1], filtered.irradiance[2]}, filtered.variance};
+  } else if (from.light->count(Layer::kSoft, texel) > 0) {
+    lit.has_soft = true;
+    lit.soft.mean = from.light->mean(Layer::kSoft, texel);
+    const float grey = luminance(lit.soft.mean);
+    lit.soft.variance = from.light->variance_of_mean(Layer::kSoft, texel, grey * grey);
+  }
+  return lit;
+}
+
+// Gives the layers a texel lacks what the coarse level has of its place; `at` as in StoredLight::guess().
+void TileDisplay::add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm::vec2& at) const {
+  if (coarse_ == nullptr || id.level() == coarse_->level() || (lit.has_sharp && lit.has_soft)) return;
+  const auto guess = coarse_->guess(PatchId{patch}, id.level(), at);
+  if (!guess) return;
+  if (!lit.has_sharp) lit.sharp = from_guess(guess->sharp, guess->sharp_spread);
+  if (!lit.has_soft) lit.soft = from_guess(guess->soft, guess->soft_spread);
+  lit.has_sharp = lit.has_soft = true;
+}
+
+void TileDisplay::shade_slot(TileId id, const LevelTiles& level, std::vector<float>& variance, SlotColours& colours) {
   variance.assign(kSlotTexels, 0.0f);
+  const glm::vec2 first(static_cast<float>(id.index() % level.x * kTileSize) - 0.5f,
+                        static_cast<float>(id.index() / level.x * kTileSize) - 0.5f);  // centre of slot texel (0, 0)
   for (int y = 0; y < kSlotSize; ++y) {
     const Step row = step_of(y - 1);
     for (int x = 0; x < kSlotSize; ++x) {
@@ -91,32 +125,24 @@ void TileDisplay::shade_slot(std::vector<float>& variance, SlotColours& colours)
       const auto at = static_cast<std::size_t>(y * kSlotSize + x);
       const int texel = row.texel * kTileSize + column.texel;
       if (!from.facts) continue;
-      colours.fill.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
-      if (!from.light || from.light->count(Layer::kSharp, texel) <= 0 || !from.facts->knows_albedo(texel)) continue;
-      const auto& f = filtered_[at];
-      if (!f.known && from.light->count(Layer::kSoft, texel) <= 0) continue;  // filled from those that have it
-      const glm::vec3 sharp = from.light->mean(Layer::kSharp, texel);
-      glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
-      const float grey_sharp = grey_of(sharp);
-      const float grey_soft = grey_of(soft);
-      float soft_variance = from.light->variance_of_mean(Layer::kSoft, texel, grey_soft * grey_soft);
-      if (f.known) {
-        soft = {f.irradiance[0], f.irradiance[1], f.irradiance[2]};
-        soft_variance = f.variance;
-      }
+      const std::uint32_t patch = from.facts->patch[static_cast<std::size_t>(texel)];
+      colours.fill.patch[at] = patch;
+      if (patch == kNobody || !from.facts->knows_albedo(texel)) continue;
+      Lit lit = light_of(from, texel, filtered_[at]);
+      add_guess(lit, id, patch, first + glm::vec2(x, y));
+      if (!lit.has_sharp || !lit.has_soft) continue;  // filled from those that have it
       const glm::vec3 albedo = from.facts->albedo(texel);
-      // One shadow ray a sample: a lone sample is mostly right, its spread is about a third of its value (measured).
-      variance[at] =
-          grey_of(albedo) * grey_of(albedo) *
-          (soft_variance + from.light->variance_of_mean(Layer::kSharp, texel, kLoneSample * grey_sharp * grey_sharp));
-      const glm::vec3 all = ((sharp + soft) * albedo + from.facts->emission(texel)) * options_.exposure;
+      const float grey = luminance(albedo);
+      variance[at] = grey * grey * (lit.soft.variance + lit.sharp.variance);
+      const glm::vec3 all =
+          ((lit.sharp.mean + lit.soft.mean) * albedo + from.facts->emission(texel)) * options_.exposure;
       colours.fill.set(static_cast<int>(at), {all.x, all.y, all.z});
     }
   }
 }
 
 float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const std::vector<float>& variance,
-                            float& samples) const {
+                            const std::array<bool, kSlotTexels>& known, float& samples) const {
   double squares = 0;
   double count = 0;
   int texels = 0;
@@ -126,7 +152,7 @@ float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const
     if (around_[4].facts && around_[4].facts->patch[static_cast<std::size_t>(t)] == kNobody) continue;
     ++texels;
     if (around_[4].light) count += around_[4].light->count(Layer::kSoft, t);
-    if (!around_[4].light || around_[4].light->count(Layer::kSharp, t) <= 0) {
+    if (!known[at]) {
       squares += 0.25 * 0.25;  // filled from neighbours: nothing is known of it
       continue;
     }
@@ -152,8 +178,9 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   }
   std::vector<float> variance;
   SlotColours colours;
-  shade_slot(variance, colours);
+  shade_slot(id, level, variance, colours);
   if (std::none_of(colours.fill.known.begin(), colours.fill.known.end(), [](bool k) { return k; })) return std::nullopt;
+  const auto known = colours.fill.known;  // before the others are filled
   colours.fill.run();
 
   auto image = std::make_shared<TileImage>();
@@ -163,7 +190,7 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   if (around_[4].facts) image->coverage = around_[4].facts->coverage;
 
   TilePicture picture;
-  picture.error = error_of(*image, mask, variance, picture.samples);
+  picture.error = error_of(*image, mask, variance, known, picture.samples);
   picture.image = std::move(image);
   return picture;
 }

@@ -8,6 +8,7 @@
 
 #include "actors/atlas/radiance_store.hpp"
 #include "actors/renderer/filter_irradiance.hpp"
+#include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/tile_facts.hpp"
 #include "actors/types/tile_image.hpp"
 
@@ -28,11 +29,14 @@ struct TilePicture {
 /// Makes pictures; keeps scratch memory, so one per thread. Reads the store and the facts: nobody may write them then.
 class TileDisplay {
  public:
-  TileDisplay(const atlas::RadianceStore& store, const TileFactsCache& facts, DisplayOptions options)
-      : store_(store), facts_(facts), options_(options) {}
+  /// `coarse`, if not null, is what texels without samples show.
+  TileDisplay(const atlas::RadianceStore& store, const TileFactsCache& facts, DisplayOptions options,
+              const StoredLight* coarse = nullptr)
+      : store_(store), facts_(facts), options_(options), coarse_(coarse) {}
 
   /// The slot's 32x32 texels: payload and border (from the neighbour tiles where they are shaded), soft light filtered,
-  /// unshaded texels filled from their patch, then from anything. nullopt if no texel of the slot was ever shaded.
+  /// texels without samples lit as the coarse level has their place, else filled from their patch, then from anything.
+  /// nullopt if nothing is known of any texel of the slot.
   std::optional<TilePicture> draw(TileId id, const LevelTiles& level, const TexelMask& mask);
 
   /// The soft light of the slot drawn last as it was filtered; not known where it was not.
@@ -46,13 +50,22 @@ class TileDisplay {
   void look_around(TileId id, const LevelTiles& level);
   [[nodiscard]] int radius_of(const TexelMask& mask) const;
   void gather(int radius);
-  void shade_slot(std::vector<float>& variance, struct SlotColours& colours);
+  struct Lit {
+    bool has_sharp = false;
+    bool has_soft = false;
+    LayerLight sharp;
+    LayerLight soft;
+  };
+  [[nodiscard]] static Lit light_of(const Neighbour& from, int texel, const FilteredTexel& filtered);
+  void add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm::vec2& at) const;
+  void shade_slot(TileId id, const LevelTiles& level, std::vector<float>& variance, struct SlotColours& colours);
   [[nodiscard]] float error_of(const TileImage& image, const TexelMask& mask, const std::vector<float>& variance,
-                               float& samples) const;
+                               const std::array<bool, kSlotTexels>& known, float& samples) const;
 
   const atlas::RadianceStore& store_;
   const TileFactsCache& facts_;
   DisplayOptions options_;
+  const StoredLight* coarse_;
   std::array<Neighbour, 9> around_;
   FilterWindow window_;
   IrradianceFilter filter_;

@@ -74,7 +74,13 @@ std::shared_ptr<const CoverageTile> cover_tile(TileId id, const LevelTiles& leve
   return coverage;
 }
 
-std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces,
+void TileFacts::learn_coverage(TileId id, const LevelTiles& level, const TileSurfaces& surfaces) {
+  if (coverage_learned) return;
+  coverage = cover_tile(id, level, surfaces);
+  coverage_learned = true;
+}
+
+std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const TileSurfaces& surfaces,
                                                const atlas::RadianceStore& store) {
   {
     const std::scoped_lock lock(mutex_);
@@ -87,7 +93,6 @@ std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const LevelTiles& leve
   if (!surface) return nullptr;
   auto facts = std::make_shared<TileFacts>();
   for (int t = 0; t < kTileTexels; ++t) facts->patch[static_cast<std::size_t>(t)] = surface->patch(t);
-  facts->coverage = cover_tile(id, level, surfaces);
   if (surface->emits())
     facts->emission_means.assign(kTileTexels, glm::vec3(0.0f));  // not stored: learned together with albedo
   else if (const auto stored = store.read(id))

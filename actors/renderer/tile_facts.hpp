@@ -23,7 +23,8 @@ struct TileFacts {
   std::array<std::uint32_t, kTileTexels> patch{};
   atlas::TileAlbedo albedo_means;
   std::vector<glm::vec3> emission_means;         ///< per texel, nits, of the same points; empty: nothing emits
-  std::shared_ptr<const CoverageTile> coverage;  ///< null: opaque
+  std::shared_ptr<const CoverageTile> coverage;  ///< null: opaque, or not learned
+  bool coverage_learned = false;
 
   [[nodiscard]] bool knows_albedo(int texel) const { return albedo_means.points[static_cast<std::size_t>(texel)] > 0; }
   [[nodiscard]] glm::vec3 albedo(int texel) const {
@@ -33,6 +34,8 @@ struct TileFacts {
   [[nodiscard]] glm::vec3 emission(int texel) const {
     return emission_means.empty() ? glm::vec3(0.0f) : emission_means[static_cast<std::size_t>(texel)];
   }
+  /// Fills `coverage` in once.
+  void learn_coverage(TileId id, const LevelTiles& level, const TileSurfaces& surfaces);
   /// Brings albedo and emission of each texel of `wanted` to a mean of `wanted_points` points: few at first, so that
   /// the first picture comes soon, more when light is exact enough to show the difference. True if something was
   /// learned.
@@ -49,10 +52,9 @@ class TileFactsCache {
  public:
   explicit TileFactsCache(std::size_t max_tiles = 16384) : max_tiles_(max_tiles < 16 ? 16 : max_tiles) {}
 
-  /// The tile's facts, made (patches and coverage; albedo as far as `store` knows it) if they are not there. Null
+  /// The tile's facts, made (patches; albedo as far as `store` knows it) if they are not there. Null
   /// outside the level. Reads the tile's block: nobody may write it then.
-  std::shared_ptr<TileFacts> get(TileId id, const LevelTiles& level, const TileSurfaces& surfaces,
-                                 const atlas::RadianceStore& store);
+  std::shared_ptr<TileFacts> get(TileId id, const TileSurfaces& surfaces, const atlas::RadianceStore& store);
   [[nodiscard]] std::shared_ptr<const TileFacts> find(TileId id) const;
 
  private:

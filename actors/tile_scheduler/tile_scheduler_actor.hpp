@@ -27,7 +27,7 @@ struct SchedulerOptions {
   int passes_moving = 1;                 ///< visibility passes in the first update of a new pose, 1..64
   int passes_still = 1;                  ///< and in each further one, until kAllPasses are done
   float lit = 0.8f;                      ///< while pictures of less than this share of a view are there,
-  int passes_unlit = 4;                  ///< passes after these come
+  int passes_unlit = 2;                  ///< passes after these come
   int updates_unlit = 4;                 ///< in one of so many updates: the same cores make the pictures
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
   /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.

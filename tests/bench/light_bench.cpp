@@ -95,7 +95,7 @@ void light_coarse(LitView& view, renderer::TileSurfaces& surfaces, std::uint32_t
       const TileId tile(level, static_cast<std::uint32_t>(i));
       const auto surface = surfaces.tile(tile);
       (void)renderer::shade_tile(store, tile, TexelMask::all(), n, *surface, n);
-      if (const auto known = facts.get(tile, tiles, surfaces, store);
+      if (const auto known = facts.get(tile, surfaces, store);
           known && known->learn_albedo(*surface, TexelMask::all(), 4))
         if (auto update = store.begin_update(tile)) update->put_albedo(known->albedo_means);
     });

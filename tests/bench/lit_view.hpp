@@ -90,8 +90,7 @@ inline void light(LitView& view, const TileMasks& masks, std::uint32_t samples) 
     if (!surface) return;
     for (std::uint32_t n = 0; n < samples; n += 8)
       if (!renderer::shade_tile(store, tile, mask, 8, *surface, samples)) return;
-    if (const auto known = facts.get(tile, level_of(i), *surfaces, store);
-        known && known->learn_albedo(*surface, mask, 8))
+    if (const auto known = facts.get(tile, *surfaces, store); known && known->learn_albedo(*surface, mask, 8))
       if (auto update = store.begin_update(tile)) update->put_albedo(known->albedo_means);
   });
   std::vector<tile_scheduler::ShadedTile> shaded(tiles.size());

@@ -81,7 +81,7 @@ class Picture : public ::testing::Test {
     for (const std::uint32_t passes : {1u, 4u})  // the first pass, then soft light for all
       (void)renderer::shade_tile(*store_, tile, TexelMask::all(), passes, *world_.tile(tile)).value();
     renderer::TileFactsCache facts;
-    facts.get(tile, level, world_, *store_)->learn_albedo(*world_.tile(tile), TexelMask::all());
+    facts.get(tile, world_, *store_)->learn_albedo(*world_.tile(tile), TexelMask::all());
     renderer::TileDisplay display(*store_, facts, {exposure, 384});
     return display.draw(tile, level, TexelMask::all()).value();
   }

@@ -1,12 +1,18 @@
 #include "actors/renderer/stored_light.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <glm/common.hpp>
 #include <limits>
 
 #include "actors/atlas/build_layout.hpp"
+#include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/light_transport.hpp"
+#include "actors/renderer/tile_display.hpp"
+#include "actors/renderer/tile_surface_scene.hpp"
 #include "tests/unit/trace/hand_scene.hpp"
 
 namespace darm::renderer {
@@ -16,12 +22,12 @@ using test::HandScene;
 
 // A closed room of one material, seen from inside.
 struct Room {
-  explicit Room(const scene::Material& material) {
+  explicit Room(const scene::Material& material, float q = 16) {
     HandScene hand;
     hand.box(glm::vec3(-2), glm::vec3(2), hand.material(material), true);
     scene = hand.share();
     rays = trace::RayScene::build(scene, 1).value();
-    layout = atlas::build_layout(*scene, {.q = 16}).value();
+    layout = atlas::build_layout(*scene, {.q = q}).value();
     transport = std::make_unique<LightTransport>(scene, rays);
   }
   [[nodiscard]] StoredLight lit(const StoredTexel& texel) const {
@@ -83,6 +89,85 @@ TEST(StoredLight, APathEndsInItAtTheFirstDiffuseSurface) {
     // Near the corners a ray is too short for coarse texels and goes on: then it meets the next wall's.
     EXPECT_TRUE(std::abs(soft - 1.0f) < 1e-5f || soft <= 0.5f + 1e-5f) << soft;
   }
+}
+
+// Light that rises along the coarse level's rows and columns.
+StoredTexel slope(float x, float y) { return {glm::vec3(x + 3 * y), glm::vec3(2 * x + y), true}; }
+
+StoredLight sloping(const std::shared_ptr<const atlas::Layout>& layout) {
+  StoredLight light(layout);
+  const auto& level = layout->levels.back();
+  for (std::uint32_t t = 0; t < level.tiles_x * level.tiles_y; ++t) {
+    std::vector<StoredTexel> tile;
+    for (int i = 0; i < kTileTexels; ++i)
+      tile.push_back(slope(static_cast<float>(t % level.tiles_x * kTileSize) + static_cast<float>(i % kTileSize),
+                           static_cast<float>(t / level.tiles_x * kTileSize) + static_cast<float>(i / kTileSize)));
+    light.put(t, tile);
+  }
+  return light;
+}
+
+TEST(StoredLight, GuessOfAFinerLevelIsTheBilinearValueAtTheSameSurfacePoint) {
+  const Room room(matte(0.5f), 128);
+  const int coarse = room.layout->coarse_level();
+  ASSERT_GE(coarse, 1);
+  const auto light = sloping(room.layout);
+  for (std::uint32_t instance = 0; instance < room.scene->instances.size(); ++instance) {
+    const PatchId patch = room.layout->patch_of(instance, 0, true);
+    const glm::vec2 uv = room.layout->patch_uv(instance, 0, 0.31f, 0.27f);
+    const auto guess = light.guess(patch, 0, room.layout->texel_at(patch, 0, uv));
+    ASSERT_TRUE(guess);
+    const glm::vec2 at = room.layout->texel_at(patch, coarse, uv) - 0.5f;
+    const auto truth = slope(at.x, at.y);
+    EXPECT_NEAR(guess->sharp.x, truth.sharp.x, 1e-3f * truth.sharp.x);
+    EXPECT_NEAR(guess->soft.y, truth.soft.y, 1e-3f * truth.soft.y);
+    // Four texels a step of 1 and of 3 apart, with bilinear weights: the variance is a (1 - a) + 9 b (1 - b).
+    const glm::vec2 part = glm::fract(at);
+    EXPECT_NEAR(guess->sharp_spread, part.x * (1 - part.x) + 9 * part.y * (1 - part.y), 0.01f);
+  }
+}
+
+TEST(StoredLight, GuessLeavesOutWhatIsNotKnown) {
+  const Room room(matte(0.5f), 128);
+  StoredLight light(room.layout);
+  const PatchId patch = room.layout->patch_of(0, 0, true);
+  const glm::vec2 uv = room.layout->patch_uv(0, 0, 0.3f, 0.3f);
+  const glm::vec2 fine = room.layout->texel_at(patch, 0, uv);
+  EXPECT_FALSE(light.guess(patch, 0, fine));
+  // Of the four texels around the place only the nearest is known: its value, and no spread.
+  const auto& level = room.layout->levels.back();
+  const auto at = glm::uvec2(room.layout->texel_at(patch, room.layout->coarse_level(), uv));
+  std::vector<StoredTexel> tile(kTileTexels);
+  tile[at.y % kTileSize * kTileSize + at.x % kTileSize] = {glm::vec3(4.0f), glm::vec3(5.0f), true};
+  light.put(at.y / kTileSize * level.tiles_x + at.x / kTileSize, tile);
+  const auto guess = light.guess(patch, 0, fine);
+  ASSERT_TRUE(guess);
+  EXPECT_FLOAT_EQ(guess->sharp.x, 4.0f);
+  EXPECT_FLOAT_EQ(guess->soft.x, 5.0f);
+  EXPECT_NEAR(guess->sharp_spread, 0.0f, 1e-5f);
+}
+
+TEST(StoredLight, TexelsWithoutSamplesStartFromItAndKeepTheirAlbedo) {
+  const Room room(matte(0.5f), 128);
+  const auto dir = std::filesystem::temp_directory_path() / ("darm_guess_" + std::to_string(::getpid()));
+  auto store = atlas::RadianceStore::open(dir, {}, *room.layout).value();
+  const auto mapper = std::make_shared<atlas::TexelMapper>(room.scene, room.layout);
+  const auto surfaces =
+      make_scene_surfaces(room.scene, mapper, std::make_shared<LightTransport>(room.scene, room.rays));
+  const auto light = room.lit({glm::vec3(0.25f), glm::vec3(0.15f), true});
+  const TileId tile(0, 0);
+  TileFactsCache facts;
+  facts.get(tile, *surfaces, *store)->learn_albedo(*surfaces->tile(tile), TexelMask::all());
+  const auto level = level_tiles_of(*room.layout).front();
+  const DisplayOptions options{1.0f, 384};
+  EXPECT_FALSE(TileDisplay(*store, facts, options).draw(tile, level, TexelMask::all())) << "nothing is known";
+  const auto picture = TileDisplay(*store, facts, options, &light).draw(tile, level, TexelMask::all());
+  ASSERT_TRUE(picture);
+  const float albedo = facts.find(tile)->albedo(5 * kTileSize + 5).x;
+  EXPECT_EQ(picture->image->rgb[(6 * kSlotSize + 6) * 3], srgb_code(0.4f * albedo));
+  EXPECT_EQ(picture->samples, 0.0f);
+  EXPECT_GT(picture->error, 0.01f) << "it is only a guess";
+  std::filesystem::remove_all(dir);
 }
 
 TEST(StoredLight, AMirrorTakesItsSoftLightAndLooksForSharpLightItself) {

@@ -31,13 +31,13 @@ class TileDisplayTest : public ::testing::Test {
     if (survey_tile(*store_, id, mask, *world_.tile(id)).unshaded > 0) first_pass(id, mask);
     auto result = shade_tile(*store_, id, mask, passes, *world_.tile(id));
     EXPECT_TRUE(result);
-    facts_.get(id, level_, world_, *store_)->learn_albedo(*world_.tile(id), mask);
+    facts_.get(id, world_, *store_)->learn_albedo(*world_.tile(id), mask);
     return *result;
   }
   ShadingResult first_pass(TileId id, const TexelMask& mask = TexelMask::all()) {
     auto result = shade_tile(*store_, id, mask, 1, *world_.tile(id));
     EXPECT_TRUE(result);
-    facts_.get(id, level_, world_, *store_)->learn_albedo(*world_.tile(id), mask);
+    facts_.get(id, world_, *store_)->learn_albedo(*world_.tile(id), mask);
     return *result;
   }
   TilePicture draw(TileId id, float filter = 384, const TexelMask& mask = TexelMask::all()) {
