@@ -49,7 +49,6 @@ renderer::RendererOptions renderer_options(const config::Config& config, float e
   options.display.exposure = exposure;
   options.display.filter_samples = static_cast<float>(config.accuracy.filter_samples);
   options.schedule.max_samples = config.render.max_samples;
-  options.schedule.target_error = static_cast<float>(config.accuracy.target);
   options.slice_ms = static_cast<float>(config.render.slice_ms);
   return options;
 }
@@ -58,7 +57,6 @@ renderer::ViewRendererOptions view_options(const config::Config& config, float e
   renderer::ViewRendererOptions options;
   options.tile.exposure = exposure;
   options.tile.max_samples = static_cast<float>(config.render.max_samples);
-  options.tile.target_error = static_cast<float>(config.accuracy.target);
   options.slice_ms = static_cast<float>(config.render.slice_ms);
   return options;
 }
@@ -70,6 +68,8 @@ session::SessionPolicy session_policy(const config::Config& config, const World&
   policy.allow_chroma_444 = config.stream.chroma_444;
   policy.allow_lossless = config.stream.allow_lossless;
   policy.updates_per_second = static_cast<float>(config.stream.updates_per_second);
+  policy.target_error = static_cast<float>(config.accuracy.target);
+  policy.least_target_error = static_cast<float>(std::min(config.accuracy.client_target_min, config.accuracy.target));
   policy.start = start_camera(config, *world.scene);
   policy.handshake_timeout = static_cast<Microseconds>(config.session.handshake_timeout_s * 1e6);
   policy.idle_timeout = static_cast<Microseconds>(config.session.idle_timeout_s * 1e6);

@@ -18,6 +18,7 @@ struct TileRequest {
   TileId tile;
   float weight = 0;
   bool display = true;
+  float target_error = 0;  ///< RMS display error under which it costs no more time; 0: never
   TexelMask mask;
 };
 

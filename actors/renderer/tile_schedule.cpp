@@ -33,6 +33,7 @@ void TileSchedule::replace(const std::vector<TileRequest>& work, const std::func
     s.mask = request.mask;
     s.weight = std::isfinite(request.weight) ? std::max(request.weight, 0.0f) : 0.0f;
     s.display = request.display;
+    s.target_error = request.target_error;
     s.stored = s.stored || stored(request.tile);
     next.insert_or_assign(request.tile, s);
   }
@@ -41,7 +42,7 @@ void TileSchedule::replace(const std::vector<TileRequest>& work, const std::func
 
 bool TileSchedule::finished(const State& s) const {
   if (s.progress.texels == 0 || s.progress.least >= static_cast<float>(options_.max_samples)) return true;
-  return options_.target_error > 0 && s.error >= 0 && s.error <= options_.target_error && s.progress.unshaded == 0 &&
+  return s.target_error > 0 && s.error >= 0 && s.error <= s.target_error && s.progress.unshaded == 0 &&
          s.pictured_mean >= kLeastForTarget;
 }
 

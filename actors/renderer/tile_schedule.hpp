@@ -26,7 +26,6 @@ struct TileJob {
 
 struct ScheduleOptions {
   std::uint32_t max_samples = 4096;  ///< a texel
-  float target_error = 0;            ///< a tile under it stops costing time; 0: never
   float publish_growth = 2.0f;       ///< a picture again after this factor in samples; > 1
   std::uint32_t job_samples = 1000;  ///< about so many in one job
 };
@@ -66,6 +65,7 @@ class TileSchedule {
     TexelMask mask;
     float weight = 0;
     bool display = true;
+    float target_error = 0;
     bool surveyed = false;
     bool asked_store = false;  // for its picture
     bool stored = false;

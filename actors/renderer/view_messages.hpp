@@ -25,11 +25,13 @@ struct ViewTileRequest {
 struct ShadeView {
   static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
   SessionId session{};
-  glm::vec3 eye{0.0f};  ///< recentred world space, finite
+  glm::vec3 eye{0.0f};     ///< recentred world space, finite
+  float target_error = 0;  ///< RMS display error under which a tile costs no more time; 0: never
   std::shared_ptr<const std::vector<ViewTileRequest>> work;
 
-  ShadeView(SessionId id, const glm::vec3& position, std::shared_ptr<const std::vector<ViewTileRequest>> tiles)
-      : session(id), eye(position), work(std::move(tiles)) {}
+  ShadeView(SessionId id, const glm::vec3& position, float target,
+            std::shared_ptr<const std::vector<ViewTileRequest>> tiles)
+      : session(id), eye(position), target_error(target), work(std::move(tiles)) {}
   [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
 };
 

@@ -56,7 +56,9 @@ void ViewRendererActor::take(const ShadeView& wish) {
     return;
   }
   std::unordered_map<TileId, Held> kept;
-  auto& tiles = views_[wish.session].tiles;
+  auto& view = views_[wish.session];
+  view.target_error = wish.target_error;
+  auto& tiles = view.tiles;
   for (const auto& request : *wish.work) {
     if (tiles_held_ >= parts_->options.max_tiles) {
       metrics().count("darm_view_tiles_refused_total");
@@ -85,7 +87,7 @@ void ViewRendererActor::add_jobs(SessionId session, View& view, double budget, B
   };
   std::vector<Candidate> candidates;
   for (auto& [tile, held] : view.tiles) {
-    if (held.tile->finished(parts_->options.tile)) continue;
+    if (held.tile->finished(parts_->options.tile, view.target_error)) continue;
     const double n = double{held.tile->least()};
     const double gain = n < 1 ? 1e9 * (1e-4 + double{held.share}) * static_cast<double>(batch_number_ + 1 - held.batch)
                               : double{held.share * held.tile->display_variance()} / (n * (n + 1));

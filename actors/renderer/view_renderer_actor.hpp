@@ -47,6 +47,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
     std::uint64_t batch = 0;  // in which it was shaded last
   };
   struct View {
+    float target_error = 0;
     std::unordered_map<TileId, Held> tiles;
   };
   struct Job;

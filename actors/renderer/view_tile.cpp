@@ -73,9 +73,9 @@ void ViewTile::see_from(const glm::vec3& eye, const ViewTileOptions& options) {
   if (pictured_ >= 0) pictured_ = std::min(pictured_ * kept, mean_) * kFadeOfForgotten;
 }
 
-bool ViewTile::finished(const ViewTileOptions& options) const {
+bool ViewTile::finished(const ViewTileOptions& options, float target_error) const {
   if (live_ == 0) return true;
-  return least_ >= options.max_samples || (pictured_ > 0 && least_ >= 16 && error_ < options.target_error);
+  return least_ >= options.max_samples || (pictured_ > 0 && least_ >= 16 && error_ < target_error);
 }
 
 void ViewTile::add(Texel& texel, const ViewDependentLight& light) {

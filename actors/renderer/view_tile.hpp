@@ -15,7 +15,6 @@ namespace darm::renderer {
 struct ViewTileOptions {
   float exposure = 1;
   float max_samples = 4096;     ///< a texel
-  float target_error = 0.002f;  ///< a tile whose standard error is under it costs no more time
   float publish_growth = 2.0f;  ///< a picture again after this factor in samples
   /// A turn of the eye, as seen from the surface, by this share of the lobe's width makes samples worthless.
   float lobe_share = 0.25f;
@@ -38,7 +37,7 @@ class ViewTile {
   [[nodiscard]] int wanted() const { return live_; }
   /// Variance of one sample in display values, averaged over the wanted texels; as large as can be until it is known.
   [[nodiscard]] float display_variance() const { return display_variance_; }
-  [[nodiscard]] bool finished(const ViewTileOptions& options) const;
+  [[nodiscard]] bool finished(const ViewTileOptions& options, float target_error) const;
 
   /// Takes up to `passes` samples of each wanted texel that is not ahead of the others. Returns how many.
   std::uint32_t shade(ViewSurface& surface, std::uint32_t passes);

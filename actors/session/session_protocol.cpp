@@ -149,13 +149,21 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
     }
   }
   state_ = State::kOpen;
-  send_welcome(*format);
+  const float target = target_error(hello);
+  send_welcome(*format, target);
   send_scene(eye);
-  actions.push_back(tile_scheduler::SessionOpened(id_, *format));
+  actions.push_back(tile_scheduler::SessionOpened(id_, *format, target));
   actions.push_back(encoder::CoarseWanted(id_));
 }
 
-void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format) {
+// What is not a number above 0 asks for nothing.
+float SessionProtocol::target_error(const wire::Hello& hello) const {
+  const float wanted = hello.target_error();
+  if (!(wanted > 0)) return policy_.target_error;
+  return std::clamp(wanted, policy_.least_target_error, 1.0f);
+}
+
+void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, float target_error) {
   wire::Envelope envelope;
   auto* w = envelope.mutable_welcome();
   w->set_version(proto::kProtocolVersion);
@@ -169,6 +177,7 @@ void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format) {
   w->set_updates_per_second(policy_.updates_per_second);
   w->set_server(policy_.server);
   w->set_view_phystex(format.view_phystex);
+  w->set_target_error(target_error);
   send(envelope);
 }
 

@@ -27,7 +27,9 @@ struct SessionPolicy {
   bool allow_lossless = false;     ///< tiles without codec, PhysTex up to 8192 (evaluation)
   std::uint32_t view_phystex = 0;  ///< most of a private layer: 0 (the scene calls for none), 512 or 1024
   float updates_per_second = 10.0f;
-  Camera start;  ///< where a client without a pose begins
+  float target_error = 0.002f;        ///< of a client that does not ask for its own, RMS display error, > 0
+  float least_target_error = 0.002f;  ///< that a client may ask for: more exact than this is not computed for anybody
+  Camera start;                       ///< where a client without a pose begins
   Viewport start_viewport;
   std::string server = "darmd";
   Microseconds handshake_timeout = 5'000'000;
@@ -84,8 +86,9 @@ class SessionProtocol {
   void on_ping(const wire::Ping& ping);
   void fault(std::string_view what, Microseconds now, Actions& actions);
   std::optional<tile_scheduler::StreamFormat> negotiate(const wire::Hello& hello) const;
+  [[nodiscard]] float target_error(const wire::Hello& hello) const;
   void send(const wire::Envelope& envelope);
-  void send_welcome(const tile_scheduler::StreamFormat& format);
+  void send_welcome(const tile_scheduler::StreamFormat& format, float target_error);
   void send_scene(const glm::dvec3& eye);
   void ask_for_keys(Microseconds now, Actions& actions);
 

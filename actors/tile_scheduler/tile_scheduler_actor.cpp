@@ -79,6 +79,7 @@ void TileSchedulerActor::on(SessionOpened&& message) {
   if (find(message.session) != nullptr) return;
   auto session = std::make_unique<Session>(message.format, options_);
   session->id = message.session;
+  session->target_error = message.target_error;
   session->stream_id = StreamId{next_stream_++};
   session->encoder = peers_->make_encoder(session->stream_id, message.format);
   peers_->set_receivers(session->stream_id, {message.session});
@@ -194,6 +195,7 @@ void TileSchedulerActor::on(Tick&&) {
   }
   pictures_came_ = false;
   if (work_changed) send_work();
+  record_errors();
 }
 
 int TileSchedulerActor::passes_due(Session& session, bool moved) const {
@@ -261,6 +263,7 @@ void TileSchedulerActor::reallocate(Session& session) {
   const auto started = now_us();
   session.demand =
       demand_of(session.set, *layout_, session.stream.table(), images(), coarse_.get(), options_.allocation);
+  for (auto& request : session.demand.requests) request.target_error = session.target_error;
   session.weighed_at = now_us();
   session.pictures_since = false;
   for (const auto tile : session.demand.target.tiles) images_.touch(tile);
@@ -285,11 +288,26 @@ void TileSchedulerActor::compose(Session& session) {
   const bool nothing_yet = session.demand.granted.tiles.empty() && !session.demand.target.tiles.empty();
   if (first && nothing_yet && started - session.asked_at < options_.first_frame_wait) return;
   const float error = view_error(session.demand, images(), layout_->coarse_level(), coarse_ != nullptr);
+  session.error = error;
   auto step = session.stream.step(session.demand.granted.tiles, images(), error, started);
   for (const auto& answer : step.no_change)
     peers_->sessions->find(answer.session).tell(session::NoChange(answer, error));
   if (step.frame) send_frame(session, std::move(*step.frame));
   metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
+}
+
+// One observation a view and update: quantiles over views, and the worst of now.
+void TileSchedulerActor::record_errors() {
+  double worst = 0;
+  std::size_t done = 0;
+  for (const auto& [id, session] : sessions_) {
+    if (!session->posed) continue;
+    metrics_.observe("darm_view_error", double(session->error));
+    worst = std::max(worst, double(session->error));
+    done += session->error <= session->target_error ? 1 : 0;
+  }
+  metrics_.set("darm_view_error_worst", worst);
+  metrics_.set("darm_views_on_target", double(done));
 }
 
 void TileSchedulerActor::send_frame(Session& session, encoder::ComposeFrame frame) {
@@ -317,7 +335,7 @@ void TileSchedulerActor::open_view(Session& session) {
 
 void TileSchedulerActor::close_view(Session& session) {
   if (!session.view_layer) return;
-  peers_->view_renderer().tell(renderer::ShadeView(session.id, glm::vec3(0.0f), nullptr));
+  peers_->view_renderer().tell(renderer::ShadeView(session.id, glm::vec3(0.0f), 0.0f, nullptr));
   peers_->set_receivers(session.view_stream_id, {});
   if (session.view_encoder) peers_->destroy_encoder(session.view_stream_id, session.view_encoder);
 }
@@ -337,7 +355,8 @@ void TileSchedulerActor::reallocate_view(Session& session) {
 void TileSchedulerActor::send_view_work(const Session& session) {
   if (coarse_ == nullptr || !session.posed) return;
   const glm::vec3 eye(session.posed->camera.position - rays_->scene().origin);
-  peers_->view_renderer().tell(renderer::ShadeView(session.id, eye, session.view_layer->requests()));
+  peers_->view_renderer().tell(
+      renderer::ShadeView(session.id, eye, session.target_error, session.view_layer->requests()));
 }
 
 // As force_key(), for the private layer.

@@ -82,6 +82,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     SessionId id{};
     StreamId stream_id{};
     StreamFormat format;
+    float target_error = 0;
+    float error = 1;  // estimated, of the view as it was shown last
     runtime::Ref<encoder::Inbox> encoder;
     StreamState stream;
     WorkingSet set;
@@ -121,6 +123,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void send_work();
   void force_key(Session& session);
   void compose(Session& session);
+  void record_errors();
   void send_frame(Session& session, encoder::ComposeFrame frame);
   void open_view(Session& session);
   void close_view(Session& session);

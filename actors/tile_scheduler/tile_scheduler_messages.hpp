@@ -36,7 +36,8 @@ struct SessionOpened {
   static constexpr auto kOverflow = runtime::Overflow::kReject;
   SessionId session{};
   StreamFormat format;
-  SessionOpened(SessionId id, StreamFormat f) : session(id), format(f) {}
+  float target_error = 0;  ///< RMS display error under which a tile costs no more time for it; 0: never
+  SessionOpened(SessionId id, StreamFormat f, float target) : session(id), format(f), target_error(target) {}
 };
 
 struct SessionClosed {

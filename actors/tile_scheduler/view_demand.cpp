@@ -190,6 +190,7 @@ std::vector<TileRequest> join_requests(const std::vector<const std::vector<TileR
       }
       out[number].weight += request.weight;
       out[number].display = out[number].display || request.display;
+      out[number].target_error = std::min(out[number].target_error, request.target_error);
       out[number].mask |= request.mask;
     }
   return out;

@@ -53,7 +53,8 @@ struct ErrorOptions {
 [[nodiscard]] float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse_level, bool has_coarse,
                                const ErrorOptions& options = {});
 
-/// The requests of all views as one working set: weights add, masks join, displayed if any view displays it.
+/// The requests of all views as one working set: weights add, masks join, displayed if any view displays it, as
+/// exact as the most exacting one asks.
 [[nodiscard]] std::vector<renderer::TileRequest> join_requests(
     const std::vector<const std::vector<renderer::TileRequest>*>& views);
 

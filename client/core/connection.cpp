@@ -288,6 +288,7 @@ Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& optio
   hello.set_chroma_444(options.chroma_444);
   hello.set_lossless(options.lossless);
   hello.set_max_view_phystex(options.max_view_phystex);
+  hello.set_target_error(options.target_error);
   if (auto ok = state->send_tcp(envelope); !ok) return std::unexpected(ok.error());
   std::unique_ptr<Connection> connection(new Connection(std::move(state)));
   State& s = *connection->state_;

@@ -26,6 +26,7 @@ struct ConnectOptions {
   std::uint32_t max_phystex = 2048;
   bool chroma_444 = true;
   bool lossless = false;
+  float target_error = 0;                 ///< RMS display error with which it is content, 0..1; 0: the server's own
   std::uint32_t max_view_phystex = 1024;  ///< of the private layer; 0: light that does not depend on the eye alone
   std::chrono::milliseconds connect_timeout{5000};
   std::chrono::milliseconds handshake_timeout{20000};

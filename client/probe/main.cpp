@@ -55,7 +55,8 @@ Result<void> parse_size(const std::string& text, std::uint32_t& width, std::uint
 
 struct Arguments {
   std::string server, camera, setup, size = "1280x720", walkthrough, reference, out, ceiling;
-  double until_error = -1, seconds = -1, ceiling_seconds = 0, series_interval = 0, updates_per_second = 10;
+  double until_error = -1, target_error = 0, seconds = -1, ceiling_seconds = 0, series_interval = 0,
+         updates_per_second = 10;
   std::uint32_t phystex = 2048, ceiling_phystex = 8192, view_phystex = 1024;
   unsigned bench_draw = 0;
   bool lossless = false, no_444 = false, codec_check = false, json = false;
@@ -109,6 +110,7 @@ Result<SessionPlan> make_plan(const Arguments& a) {
   plan.max_phystex = a.phystex;
   plan.max_view_phystex = a.view_phystex;
   plan.lossless = a.lossless;
+  plan.target_error = a.target_error;
   plan.keep_tiles = a.codec_check;
   plan.chroma_444 = !a.no_444;
   return plan;
@@ -210,6 +212,9 @@ void declare(CLI::App& app, Arguments& a) {
       ->check(number(0, kLongest));
   app.add_option("--until-error", a.until_error,
                  "stop once the server's estimated RMS display error is at most this, 0..1")
+      ->check(number(0, 1));
+  app.add_option("--target-error", a.target_error,
+                 "ask the server to compute until this RMS display error, 0..1; 0: its own target")
       ->check(number(0, 1));
   app.add_option("--reference", a.reference, "BASE.pfm with its halves BASE.a.pfm and BASE.b.pfm beside it");
   app.add_option("--ceiling-seconds", a.ceiling_seconds,

@@ -327,6 +327,7 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   options.max_phystex = plan_.max_phystex;
   options.max_view_phystex = plan_.max_view_phystex;
   options.chroma_444 = plan_.chroma_444;
+  options.target_error = static_cast<float>(plan_.target_error);
   options.lossless = plan_.lossless;
   auto connection = Connection::open(options);
   if (!connection) return std::unexpected(connection.error());
@@ -337,6 +338,7 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   shape_ = {welcome.phystex_size(), welcome.chroma_444(), welcome.lossless()};
   view_shape_ = {welcome.view_phystex(), welcome.chroma_444(), welcome.lossless()};
   report_.view_phystex_size = welcome.view_phystex();
+  report_.target_error = static_cast<double>(welcome.target_error());
   report_.server = welcome.server();
   report_.udp = connection_->uses_udp();
   report_.phystex_size = welcome.phystex_size();

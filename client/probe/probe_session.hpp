@@ -26,6 +26,7 @@ struct SessionPlan {
   std::vector<double> draw_times;     ///< seconds from the connection, rising; a point of the series each
   std::uint32_t max_phystex = 2048;
   std::uint32_t max_view_phystex = 1024;  ///< of the private layer; 0: none
+  double target_error = 0;                ///< asked of the server; 0: its own
   bool lossless = false;
   bool chroma_444 = true;
   bool keep_tiles = false;  ///< report what each resident tile shows at the end
@@ -56,6 +57,7 @@ struct SessionReport {
   std::string server;
   bool udp = false;
   std::uint32_t phystex_size = 0;
+  double target_error = 0;              ///< of this session, as the server says
   std::uint32_t view_phystex_size = 0;  ///< 0: no private layer
   std::uint32_t view_slots_used = 0;
   std::uint64_t view_frames = 0, view_frames_lost = 0, view_bytes = 0;

@@ -72,6 +72,7 @@ std::string to_json(const Outcome& o) {
   j["server"] = s.server;
   j["phystex_size"] = s.phystex_size;
   j["view_phystex_size"] = s.view_phystex_size;
+  j["target_error"] = s.target_error;
   j["view_slots_used"] = s.view_slots_used;
   j["view_frames"] = s.view_frames;
   j["view_frames_lost"] = s.view_frames_lost;

@@ -70,6 +70,7 @@ struct AccuracyConfig {
   double target = 0.002;               ///< RMS display error (0..1) of a tile under which it costs no more time
   std::string indirect = "stored";     ///< where paths end: "stored" in light that is known, or "traced" to their end
   std::uint32_t filter_samples = 384;  ///< samples that soft light is averaged over while it has fewer; 0: not at all
+  double client_target_min = 0.0005;   ///< least target that a client may ask for (or `target`, where that is less)
 };
 
 /// The knobs of a preset by its name; `balanced` for a name that is none.

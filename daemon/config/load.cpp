@@ -106,6 +106,7 @@ void read_work(TableReader& root, Config& config) {
     if (preset != accuracy.preset) accuracy = preset_of(preset);
     reader.number("target", accuracy.target, 0.0001, 1);
     reader.choice("indirect", accuracy.indirect, {"stored", "traced"});
+    reader.number("client_target_min", accuracy.client_target_min, 0.0001, 1);
     reader.integer("filter_samples", accuracy.filter_samples, 0, 4096);
   });
   root.table("stream", [&](TableReader& reader) {

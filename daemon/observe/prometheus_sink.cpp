@@ -45,7 +45,11 @@ const prometheus::Histogram::BucketBoundaries& buckets_for(std::string_view name
       for (const double step : {1.0, 2.0, 5.0}) list.push_back(b * step);
     return list;
   }();
+  static const prometheus::Histogram::BucketBoundaries errors = {
+      // RMS display error, 0..1
+      0.0002, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.25};
   if (name.ends_with("_seconds")) return seconds;
+  if (name.ends_with("_error")) return errors;
   return name.ends_with("_bytes") ? bytes : other;
 }
 

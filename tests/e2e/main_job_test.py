@@ -56,6 +56,16 @@ class MainJob(unittest.TestCase):
         self.assertGreater(second["frames"], 0)
         self.assertEqual(second["frames_lost"], 0)
 
+    def test_a_client_may_ask_for_its_own_error_and_its_estimate_is_measured(self):
+        rough = probe(self.daemon.tcp, self.out, "--seconds", "30", "--until-error", "0.05", "--target-error", "0.05",
+                      camera="windows", size="160x90")
+        self.assertAlmostEqual(rough["target_error"], 0.05, places=6)
+        self.assertLessEqual(rough["error"], 0.05)
+        plain = probe(self.daemon.tcp, self.out, "--seconds", "1", camera="windows", size="160x90")
+        self.assertAlmostEqual(plain["target_error"], 0.002, places=6)
+        self.assertGreater(self.metric("darm_view_error_count"), 0)
+        self.assertIsNotNone(self.metric("darm_views_on_target"))
+
     def test_a_client_that_vanishes_leaves_nothing_behind(self):
         client = subprocess.Popen(
             [BIN / "darm-probe", "--server", f"127.0.0.1:{self.daemon.tcp}", "--camera", "0,1.7,0 1,1.7,0 60", "--size",

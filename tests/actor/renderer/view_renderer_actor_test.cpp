@@ -56,7 +56,7 @@ class ViewRendererActorTest : public ::testing::Test {
   void look(SessionId session, const glm::vec3& eye, std::uint32_t tiles = 2) {
     auto work = std::make_shared<std::vector<ViewTileRequest>>();
     for (std::uint32_t i = 0; i < tiles; ++i) work->push_back({TileId(0, i), 0.1f, whole_slot()});
-    renderer.tell(ShadeView(session, eye, std::move(work)));
+    renderer.tell(ShadeView(session, eye, 0.002f, std::move(work)));
     system.run_until_idle();
   }
   glm::ivec3 shown(SessionId session, std::uint32_t tile) {
@@ -93,7 +93,7 @@ TEST_F(ViewRendererActorTest, two_eyes_get_tiles_of_their_own_and_moving_one_lea
 TEST_F(ViewRendererActorTest, work_ends_with_the_samples_and_a_session_that_leaves_is_forgotten) {
   look(ann, {0.5f, 0.5f, 0.5f});
   EXPECT_EQ(metrics.counts["darm_view_samples_total"], 2.0 * kSlotTexels * 8);
-  renderer.tell(ShadeView(ann, {}, nullptr));
+  renderer.tell(ShadeView(ann, {}, 0.0f, nullptr));
   system.run_until_idle();
   look(ann, {0.5f, 0.5f, 0.5f});
   EXPECT_EQ(metrics.counts["darm_view_samples_total"], 4.0 * kSlotTexels * 8) << "begun anew";

@@ -107,9 +107,10 @@ class TileScheduler : public ::testing::Test {
     StreamFormat format;
     format.phystex_size = phystex_size;
     format.view_phystex = view_phystex;
-    scheduler_.tell(SessionOpened(id, format));
+    scheduler_.tell(SessionOpened(id, format, target_error_));
     system_.run_until_idle();
   }
+  float target_error_ = 0.002f;  // of sessions that are opened
   void look(SessionId id, CameraSequence sequence, const Camera& camera) {
     scheduler_.tell(ViewChanged(id, sequence, camera, Viewport{160, 90}, FrameStamps{}));
     system_.run_until_idle();

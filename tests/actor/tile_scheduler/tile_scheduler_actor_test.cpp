@@ -203,6 +203,21 @@ TEST_F(TileScheduler, JoinsTheWorkOfAllSessionsAndForgetsAClosedOne) {
   EXPECT_TRUE(heard_.receivers[StreamId{2}].empty());
 }
 
+TEST_F(TileScheduler, SharedTilesAreAsExactAsTheMostExactingSessionAsks) {
+  target_error_ = 0.01f;
+  open(ann_);
+  look(ann_, 1, ahead_);
+  for (const auto& request : *heard_.work.back().work) ASSERT_EQ(request.target_error, 0.01f);
+  target_error_ = 0.001f;
+  const SessionId bob{2};
+  open(bob);
+  look(bob, 1, ahead_);
+  for (const auto& request : *heard_.work.back().work) EXPECT_EQ(request.target_error, 0.001f);
+  scheduler_.tell(SessionClosed(bob));
+  system_.run_until_idle();
+  for (const auto& request : *heard_.work.back().work) EXPECT_EQ(request.target_error, 0.01f);
+}
+
 TEST_F(TileScheduler, ASessionThatClosesWhileItsViewIsTracedLeavesNothingBehind) {
   open(ann_);
   scheduler_.tell(ViewChanged(ann_, 1, ahead_, Viewport{160, 90}, FrameStamps{}));

@@ -59,6 +59,7 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.accuracy.target, b.accuracy.target);
   EXPECT_EQ(a.accuracy.indirect, b.accuracy.indirect);
   EXPECT_EQ(a.accuracy.filter_samples, b.accuracy.filter_samples);
+  EXPECT_EQ(a.accuracy.client_target_min, b.accuracy.client_target_min);
   EXPECT_EQ(a.stream.updates_per_second, b.stream.updates_per_second);
   EXPECT_EQ(a.stream.phystex, b.stream.phystex);
   EXPECT_EQ(a.stream.view_phystex, b.stream.view_phystex);

@@ -122,17 +122,19 @@ TEST_F(TileScheduleTest, work_ends_at_max_samples_with_a_last_picture) {
   EXPECT_TRUE(schedule.next_batch(1000).empty());
 }
 
-TEST_F(TileScheduleTest, tile_under_its_error_target_stops) {
-  ScheduleOptions options;
-  options.target_error = 0.02f;
-  schedule = TileSchedule(kLevels, options);
-  schedule.replace({request(1, 0.1f)}, nothing_stored);
+TEST_F(TileScheduleTest, tile_under_its_error_target_stops_until_a_more_exacting_viewer_comes) {
+  auto wanted = request(1, 0.1f);
+  wanted.target_error = 0.02f;
+  schedule.replace({wanted}, nothing_stored);
   for (int i = 0; i < 200 && !schedule.next_batch(1).empty(); ++i) {
     run(1);
     publish(0.01f);
   }
   EXPECT_GE(counts[TileId(0, 1)], 16.0f);
   EXPECT_LT(counts[TileId(0, 1)], 64.0f);
+  wanted.target_error = 0.005f;
+  schedule.replace({wanted}, all_stored);
+  EXPECT_EQ(schedule.next_batch(1000).size(), 1u);
 }
 
 TEST_F(TileScheduleTest, newly_seen_texels_are_shaded_and_shown_at_once) {

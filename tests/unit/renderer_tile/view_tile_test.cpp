@@ -118,16 +118,16 @@ TEST_F(ViewTileTest, noise_is_told_and_ends_the_work) {
     l.distance = 1;
     return l;
   };
-  options.target_error = 0.02f;
   tile.want(whole_slot());
   tile.see_from({1, 0, 0}, options);
   tile.shade(slot, 16);
   const float early = tile.draw(slot).error;
-  EXPECT_FALSE(tile.finished(options));
+  EXPECT_FALSE(tile.finished(options, 0.02f));
   tile.shade(slot, 240);
   const float late = tile.draw(slot).error;
   EXPECT_NEAR(late, early / 4, 0.1f * early);
-  EXPECT_TRUE(tile.finished(options));
+  EXPECT_TRUE(tile.finished(options, 0.02f));
+  EXPECT_FALSE(tile.finished(options, 0.0f)) << "no target: it goes on";
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <limits>
+
 #include "proto/limits.hpp"
 #include "tests/unit/session/small_scene.hpp"
 
@@ -145,6 +147,28 @@ TEST_F(SessionProtocolTest, a_private_layer_is_agreed_on_only_where_both_sides_h
   EXPECT_EQ(agreed(1024, 256, false), 0u);
   EXPECT_EQ(agreed(0, 1024, false), 0u) << "nothing calls for it";
   EXPECT_EQ(agreed(1024, 8192, true), 2048u);
+}
+
+TEST_F(SessionProtocolTest, a_client_may_ask_for_its_own_target_error_within_limits) {
+  const auto agreed = [&](float wanted) {
+    SessionPolicy policy;
+    policy.target_error = 0.002f;
+    policy.least_target_error = 0.0005f;
+    start(policy);
+    auto e = hello();
+    e.mutable_hello()->set_target_error(wanted);
+    float target = -1;
+    for (const auto& a : say(e))
+      if (const auto* o = std::get_if<tile_scheduler::SessionOpened>(&a)) target = o->target_error;
+    EXPECT_EQ(heard()[0].welcome().target_error(), target);
+    return target;
+  };
+  EXPECT_EQ(agreed(0), 0.002f) << "a client that does not ask";
+  EXPECT_EQ(agreed(0.02f), 0.02f);
+  EXPECT_EQ(agreed(0.001f), 0.001f);
+  EXPECT_EQ(agreed(1e-30f), 0.0005f);
+  EXPECT_EQ(agreed(1e30f), 1.0f);
+  for (const float nothing : {-1.0f, std::numeric_limits<float>::quiet_NaN()}) EXPECT_EQ(agreed(nothing), 0.002f);
 }
 
 TEST_F(SessionProtocolTest, a_client_may_ask_for_a_key_frame_of_either_layer) {
