@@ -60,7 +60,9 @@ Result<std::shared_ptr<const scene::Scene>> load_configured_scene(const config::
 }
 
 Result<Camera> find_camera(const config::Config& config, const scene::Scene& scene, const std::string& spec) {
-  return config::parse_camera_spec(spec, config.cameras, scene.cameras);
+  auto named = config.cameras;
+  named.insert(named.end(), config.load_cameras.begin(), config.load_cameras.end());
+  return config::parse_camera_spec(spec, named, scene.cameras);
 }
 
 Camera start_camera(const config::Config& config, const scene::Scene& scene) {

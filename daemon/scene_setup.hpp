@@ -18,8 +18,8 @@ namespace darm {
 /// Loads the configured scene file. The error names the file, or says that none was given.
 [[nodiscard]] Result<std::shared_ptr<const scene::Scene>> load_configured_scene(const config::Config& config);
 
-/// The camera that `spec` names: "px,py,pz tx,ty,tz fovy_degrees", a [[cameras]] name of the set-up, or a camera of the
-/// file. The error lists the names there are.
+/// The camera that `spec` names: "px,py,pz tx,ty,tz fovy_degrees", a name of the set-up's [[cameras]] or
+/// [[load_cameras]], or a camera of the file. The error lists the names there are.
 [[nodiscard]] Result<Camera> find_camera(const config::Config& config, const scene::Scene& scene,
                                          const std::string& spec);
 

@@ -8,7 +8,9 @@ namespace darm::renderer {
 namespace {
 constexpr std::uint32_t kSurveyCost = 40;  // samples' worth of time
 constexpr double kHiddenShare = 0.02;      // weight of tiles that serve only as borders
-constexpr float kLeastForTarget = 16;      // an error estimate of fewer samples is not believed
+constexpr double kFirstGain = 0.0003;  // of a first pass, for each level that the coarse one is coarser twice as much
+constexpr double kTileCost = 300;      // samples' worth of time for a tile's map, facts and picture
+constexpr float kLeastForTarget = 16;  // an error estimate of fewer samples is not believed
 }  // namespace
 
 TileSchedule::TileSchedule(std::vector<LevelTiles> levels, const ScheduleOptions& options)
@@ -53,15 +55,20 @@ TileSchedule::Need TileSchedule::need_of(const State& s) const {
   return finished(s) ? Need::kNothing : Need::kMore;
 }
 
-// Variance falls as v/n (after a first pass n is a quarter): one more sample for each of t texels gains about w * (v/n)
-// / n for the price of t samples.
-double TileSchedule::gain_of(const State& s, Need need) const {
+// Weight times the fall of squared display error, over the price in samples. A first pass takes the place of the coarse
+// level: the more levels that is away, the more it gains. A later pass over texels that have n samples takes about
+// 1 / (n + 1) of their variance away (after a first pass n is a quarter), and draws both layers.
+double TileSchedule::gain_of(TileId tile, const State& s, Need need) const {
   const double weight = (s.display ? 1.0 : kHiddenShare) * (double{s.weight} + 1e-9);
-  if (need != Need::kMore) return weight;
+  const double texels = std::max(1.0, double(s.surveyed ? s.progress.texels : s.mask.count()));
+  if (need == Need::kFirst) {
+    const int coarser = static_cast<int>(levels_.size()) - 1 - tile.level();
+    return weight * kFirstGain * std::exp2(coarser) / (kTileCost + 1.25 * texels);
+  }
   const double n = std::max(double{s.progress.mean}, 0.25);
   const double error =
       s.error > 0 ? s.error * std::sqrt(std::max(double{s.pictured_mean}, 0.25) / n) : 0.3 / std::sqrt(n);
-  return weight * error * error / (n * std::max(s.progress.texels, 1u));
+  return weight * error * error / ((n + 1) * (0.5 * kTileCost + 2 * texels));
 }
 
 TileJob TileSchedule::job_for(TileId tile, const State& s, Need need) const {
@@ -95,9 +102,9 @@ std::vector<TileJob> TileSchedule::next_batch(std::uint64_t samples) {
   candidates.reserve(tiles_.size());
   for (const auto& [tile, state] : tiles_)
     if (const Need need = need_of(state); need != Need::kNothing)
-      candidates.push_back({need, gain_of(state, need), tile, &state});
+      candidates.push_back({need, gain_of(tile, state, need), tile, &state});
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    if (a.need != b.need) return a.need < b.need;
+    if ((a.need == Need::kSurvey) != (b.need == Need::kSurvey)) return a.need == Need::kSurvey;
     if (a.gain != b.gain) return a.gain > b.gain;
     return a.tile < b.tile;  // the same order on every run
   });
@@ -105,7 +112,8 @@ std::vector<TileJob> TileSchedule::next_batch(std::uint64_t samples) {
   std::uint64_t taken = 0;
   for (const auto& c : candidates) {
     if (taken >= samples) break;
-    if (c.need != candidates.front().need) break;  // what is stored is shown, and all is lit once, before anything else
+    // What is stored is shown before anything is computed.
+    if ((c.need == Need::kSurvey) != (candidates.front().need == Need::kSurvey)) break;
     jobs.push_back(job_for(c.tile, *c.state, c.need));
     taken += jobs.back().cost;
   }

@@ -37,8 +37,9 @@ class TileSchedule {
   /// A new working set in place of the old one. `stored`: may the store hold light of this tile?
   void replace(const std::vector<TileRequest>& work, const std::function<bool(TileId)>& stored);
 
-  /// Jobs worth about `samples`, each tile at most once: first tiles whose light is stored but not shown, then every
-  /// tile's first pass by weight, then by weight * expected fall of squared error per sample. Empty: nothing to do.
+  /// Jobs worth about `samples`, each tile at most once: first tiles whose light is stored but not shown, then by
+  /// weight * expected fall of squared error per sample: a tile that shows much gets its second pass before one that
+  /// shows little its first. Empty: nothing to do.
   [[nodiscard]] std::vector<TileJob> next_batch(std::uint64_t samples);
   [[nodiscard]] bool has(TileId tile) const { return tiles_.contains(tile); }
 
@@ -80,7 +81,7 @@ class TileSchedule {
   enum class Need { kNothing, kSurvey, kFirst, kMore };
   [[nodiscard]] Need need_of(const State& s) const;
   [[nodiscard]] bool finished(const State& s) const;
-  [[nodiscard]] double gain_of(const State& s, Need need) const;
+  [[nodiscard]] double gain_of(TileId tile, const State& s, Need need) const;
   [[nodiscard]] TileJob job_for(TileId tile, const State& s, Need need) const;
 
   std::vector<LevelTiles> levels_;

@@ -30,6 +30,9 @@ void declare_time_to_quality(CLI::App& app, darm::bench::TimeToQualityOptions& o
       ->default_val("bench-state");
   app.add_option("--target", o.target_db, "dB")->capture_default_str();
   app.add_option("--seconds", o.seconds, "how long the clients watch")->capture_default_str();
+  app.add_option("--truth", o.truth_seconds,
+                 "then let light go on for so long and compare with what it has become, without codec");
+  app.add_flag("!--no-frames", o.frames, "do not trace camera frames beside");
   app.add_option("--q", o.q, "texels per world unit (default: the set-up's)");
 }
 

@@ -1,5 +1,6 @@
 #include "tests/bench/darm_bench/recording.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "client/core/renderer_gles.hpp"
@@ -9,12 +10,14 @@ namespace darm::bench {
 
 using namespace client;
 
-Result<Recording> record(std::uint16_t port, const View& view, double seconds) {
+Result<Recording> record(std::uint16_t port, const View& view, double seconds, Stream stream) {
   ConnectOptions options;
   options.host = "127.0.0.1";
   options.port = port;
   options.name = "darm-bench";
   options.max_view_phystex = 0;  // the reference is light that does not depend on the eye
+  options.lossless = stream == Stream::kLossless;
+  if (options.lossless) options.max_phystex = 8192;
   auto connection = Connection::open(options);
   if (!connection) return std::unexpected(connection.error());
   Recording out;
@@ -80,20 +83,15 @@ class Player {
     if (!picture) return std::unexpected(picture.error());
     const auto score = compare(*picture, reference);
     if (!score) return std::unexpected(score.error());
-    pictures_.push_back(std::move(picture->rgb));
-    return SeriesPoint{t, score->psnr, framed_ ? estimate_ : 1.0};
+    pictures_.push_back(std::move(*picture));
+    return SeriesPoint{t, score->psnr, score->mssim, framed_ ? estimate_ : 1.0};
   }
 
-  void compare_to_last(std::vector<SeriesPoint>& series) const {
-    for (std::size_t i = 0; i < series.size() && i < pictures_.size(); ++i) {
-      double sum = 0;
-      for (std::size_t k = 0; k < pictures_[i].size(); ++k) {
-        const double d = (double(pictures_[i][k]) - double(pictures_.back()[k])) / 255.0;
-        sum += d * d;
-      }
-      series[i].to_last = std::sqrt(sum / static_cast<double>(pictures_[i].size()));
-    }
+  void compare_to(const Image8* truth, std::vector<SeriesPoint>& series) const {
+    for (std::size_t i = 0; i < series.size() && i < pictures_.size(); ++i)
+      series[i].to_truth = display_rms(pictures_[i], truth != nullptr ? *truth : pictures_.back());
   }
+  Image8 take_last() { return pictures_.empty() ? Image8{} : std::move(pictures_.back()); }
 
  private:
   static Result<bool> changed(const Result<void>& done) {
@@ -106,14 +104,23 @@ class Player {
   std::optional<SceneModel> scene_;
   std::optional<StreamPlayer> player_;
   std::unique_ptr<GlesRenderer> renderer_;
-  std::vector<std::vector<std::uint8_t>> pictures_;  // one a point
+  std::vector<Image8> pictures_;  // one a point
   double estimate_ = 1;
   bool framed_ = false;
 };
 
 }  // namespace
 
-Result<std::vector<SeriesPoint>> replay(const Recording& recording, const Reference& reference, double target) {
+double display_rms(const Image8& a, const Image8& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.rgb.size(); ++k) {
+    const double d = (double(a.rgb[k]) - double(b.rgb[k])) / 255.0;
+    sum += d * d;
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(a.rgb.size(), 1)));
+}
+
+Result<Replayed> replay(const Recording& recording, const Reference& reference, double target, const Image8* truth) {
   std::vector<SeriesPoint> series;
   Player player(recording);
   bool stale = false;
@@ -134,8 +141,8 @@ Result<std::vector<SeriesPoint>> replay(const Recording& recording, const Refere
     drawn_at = t;
     stale = false;
   }
-  player.compare_to_last(series);
-  return series;
+  player.compare_to(truth, series);
+  return Replayed{std::move(series), player.take_last()};
 }
 
 std::optional<double> time_to(const std::vector<SeriesPoint>& series, double target) {

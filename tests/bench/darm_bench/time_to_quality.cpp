@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr double kReferencePsnr = 40;  // target + 8 dB and some
+constexpr double kSettledSeconds = 4;  // until every tile of a view is in the stream again
 
 client::View to_view(const Camera& camera, const TimeToQualityOptions& options) {
   client::View view;
@@ -50,18 +51,42 @@ void remove_stores(const fs::path& dir) {
     if (entry.path().extension() == ".store") fs::remove(entry.path(), ignored);
 }
 
-Result<std::vector<Recording>> record_all(const config::Config& config, const std::vector<client::View>& views,
-                                          double seconds) {
+// One client's recordings: of the run, and after it (where a truth is asked for) without codec and with it.
+struct ClientRecordings {
+  Recording run;
+  std::optional<Recording> truth;
+  std::optional<Recording> settled;
+};
+
+client::Result<ClientRecordings> record_one(std::uint16_t port, const client::View& view, double seconds,
+                                            double truth_seconds) {
+  ClientRecordings out;
+  auto run = record(port, view, seconds);
+  if (!run) return std::unexpected(run.error());
+  out.run = std::move(*run);
+  if (truth_seconds <= 0) return out;
+  auto truth = record(port, view, truth_seconds, Stream::kLossless);
+  if (!truth) return std::unexpected(truth.error());
+  auto settled = record(port, view, kSettledSeconds);
+  if (!settled) return std::unexpected(settled.error());
+  out.truth = std::move(*truth);
+  out.settled = std::move(*settled);
+  return out;
+}
+
+Result<std::vector<ClientRecordings>> record_all(const config::Config& config, const std::vector<client::View>& views,
+                                                 const TimeToQualityOptions& options) {
   Daemon daemon(config, 1);
   const auto addresses = daemon.start([](const std::string&) {});
   if (!addresses) return std::unexpected(addresses.error());
-  std::vector<client::Result<Recording>> made(views.size(), std::unexpected(client::Error("not recorded")));
+  std::vector<client::Result<ClientRecordings>> made(views.size(), std::unexpected(client::Error("not recorded")));
   std::vector<std::jthread> clients;
   for (std::size_t i = 0; i < views.size(); ++i)
-    clients.emplace_back([&, i] { made[i] = record(addresses->tcp, views[i], seconds); });
+    clients.emplace_back(
+        [&, i] { made[i] = record_one(addresses->tcp, views[i], options.seconds, options.truth_seconds); });
   clients.clear();  // joins
   (void)daemon.stop(std::chrono::seconds(5));
-  std::vector<Recording> out;
+  std::vector<ClientRecordings> out;
   for (auto& m : made) {
     if (!m) return fail(m.error().message);
     out.push_back(std::move(*m));
@@ -69,10 +94,41 @@ Result<std::vector<Recording>> record_all(const config::Config& config, const st
   return out;
 }
 
+// What a client's recordings show.
+struct Drawn {
+  Replayed run;
+  std::optional<double> codec_rms;     // of light that no longer changes, with codec and without
+  std::optional<double> ceiling_psnr;  // of the truth against the reference
+  std::optional<double> ceiling_mssim;
+};
+
+client::Result<Drawn> draw_recordings(const ClientRecordings& client, const client::Reference& reference,
+                                      double target) {
+  Drawn out;
+  std::optional<Replayed> truth;
+  if (client.truth && client.settled) {
+    auto shown = replay(*client.truth, reference, 0);
+    if (!shown) return std::unexpected(shown.error());
+    auto settled = replay(*client.settled, reference, 0);
+    if (!settled) return std::unexpected(settled.error());
+    if (shown->series.empty() || settled->series.empty())
+      return std::unexpected(client::Error("the truth never was a full picture"));
+    out.codec_rms = display_rms(shown->last, settled->last);
+    out.ceiling_psnr = shown->series.back().psnr;
+    out.ceiling_mssim = shown->series.back().mssim;
+    truth = std::move(*shown);
+  }
+  auto run = replay(client.run, reference, target, truth ? &truth->last : nullptr);
+  if (!run) return std::unexpected(run.error());
+  out.run = std::move(*run);
+  return out;
+}
+
 nlohmann::json to_json(const std::vector<SeriesPoint>& series) {
   auto out = nlohmann::json::array();
   for (const auto& p : series)
-    out.push_back({{"t", p.t}, {"psnr", p.psnr}, {"estimate", p.estimate}, {"to_last", p.to_last}});
+    out.push_back(
+        {{"t", p.t}, {"psnr", p.psnr}, {"mssim", p.mssim}, {"estimate", p.estimate}, {"to_truth", p.to_truth}});
   return out;
 }
 
@@ -96,6 +152,7 @@ Result<config::Config> load_config(const TimeToQualityOptions& options) {
   loaded->listen.tcp_port = 0;
   loaded->listen.udp_port = 0;
   loaded->listen.metrics_port = -1;
+  loaded->stream.allow_lossless = options.truth_seconds > 0;
   return *loaded;
 }
 
@@ -139,25 +196,29 @@ Result<nlohmann::json> time_to_quality(const TimeToQualityOptions& options) {
     jobs.push_back(job);
   }
 
-  const auto recordings = record_all(*config, views, options.seconds);
+  const auto recordings = record_all(*config, views, options);
   if (!recordings) return std::unexpected(recordings.error());
   const auto context = client::EglContext::create();
   if (!context) return fail(context.error().message);
   auto cameras = nlohmann::json::array();
   std::optional<double> atlas = 0.0, frames = 0.0;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto series = replay((*recordings)[i], references[i], options.target_db);
-    if (!series) return fail(series.error().message);
-    const auto points = trace_frames(*world->transport, jobs[i], references[i], options.target_db, 256);
+    const auto drawn = draw_recordings((*recordings)[i], references[i], options.target_db);
+    if (!drawn) return fail(drawn.error().message);
+    Result<std::vector<FramePoint>> points{};
+    if (options.frames) points = trace_frames(*world->transport, jobs[i], references[i], options.target_db, 256);
     if (!points) return std::unexpected(points.error());
-    const auto one_atlas = time_to(*series, options.target_db);
+    const auto one_atlas = time_to(drawn->run.series, options.target_db);
     const auto one_frames = time_to(*points, options.target_db);
     atlas = atlas && one_atlas ? std::optional(std::max(*atlas, *one_atlas)) : std::nullopt;
     frames = frames && one_frames ? std::optional(*frames + *one_frames) : std::nullopt;
     cameras.push_back({{"camera", options.cameras[i]},
                        {"seconds_atlas", or_null(one_atlas)},
                        {"seconds_frames", or_null(one_frames)},
-                       {"series", to_json(*series)},
+                       {"codec_rms", or_null(drawn->codec_rms)},
+                       {"ceiling_psnr", or_null(drawn->ceiling_psnr)},
+                       {"ceiling_mssim", or_null(drawn->ceiling_mssim)},
+                       {"series", to_json(drawn->run.series)},
                        {"frames", to_json(*points)}});
   }
   return nlohmann::json{{"target_db", options.target_db},

@@ -18,7 +18,9 @@ struct TimeToQualityOptions {
   std::filesystem::path state_dir;  ///< keeps layouts and references between runs; the radiance store is always empty
   double target_db = 30;
   double seconds = 20;
-  double q = 0;  ///< 0: the set-up's
+  double truth_seconds = 0;  ///< > 0: then light goes on for so long, and what it has become is the truth
+  bool frames = true;        ///< trace camera frames beside
+  double q = 0;              ///< 0: the set-up's
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
 };
@@ -26,7 +28,9 @@ struct TimeToQualityOptions {
 /// Starts a daemon in this process with an empty radiance store, one client per camera through socket and codec; clock
 /// from the first camera that is sent. Then draws what each client had received, and traces camera frames with the
 /// same integrator, one camera after another, on all cores. Keys: seconds_atlas (until all clients are at the target),
-/// seconds_frames (until all pictures are), ratio, series (per camera).
+/// seconds_frames (until all pictures are), ratio, series (per camera; its to_truth is the true error of light and
+/// codec, beside it codec_rms and ceiling: the truth's own score against the reference, which is the error of
+/// resolution).
 [[nodiscard]] Result<nlohmann::json> time_to_quality(const TimeToQualityOptions& options);
 
 }  // namespace darm::bench

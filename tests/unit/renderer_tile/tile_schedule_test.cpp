@@ -57,18 +57,38 @@ class TileScheduleTest : public ::testing::Test {
   std::unordered_map<TileId, float> counts;
 };
 
-TEST_F(TileScheduleTest, every_tile_has_its_first_pass_before_any_second) {
+TEST_F(TileScheduleTest, of_tiles_alike_the_heavier_has_its_first_pass_sooner_and_all_before_any_second) {
   std::vector<TileRequest> work;
-  for (std::uint32_t i = 0; i < 30; ++i) work.push_back(request(i, 0.001f * static_cast<float>(i + 1)));
+  for (std::uint32_t i = 0; i < 30; ++i) work.push_back(request(i, 0.01f + 0.0001f * static_cast<float>(i)));
   schedule.replace(work, nothing_stored);
   std::vector<std::uint32_t> order;
-  for (int batch = 0; batch < 6; ++batch) {
+  while (order.size() < 30) {
     const auto tiles = run(50);
     order.insert(order.end(), tiles.begin(), tiles.end());
+    publish(0.01f);
   }
   ASSERT_EQ(order.size(), 30u);
   EXPECT_TRUE(std::is_sorted(order.rbegin(), order.rend())) << "heaviest first";
   EXPECT_EQ(std::count_if(counts.begin(), counts.end(), [](const auto& c) { return c.second == 1; }), 30);
+}
+
+TEST_F(TileScheduleTest, noisy_tile_that_fills_the_view_goes_on_before_one_that_hardly_shows_begins) {
+  schedule.replace({request(1, 0.9f), request(2, 0.001f)}, nothing_stored);
+  EXPECT_EQ(run(1), std::vector<std::uint32_t>{1});
+  publish(0.05f);
+  for (int pass = 0; pass < 3; ++pass) EXPECT_EQ(run(1), std::vector<std::uint32_t>{1});
+  schedule.pictured(TileId(0, 1), 0.001f);
+  EXPECT_EQ(run(1), std::vector<std::uint32_t>{2}) << "but not for ever";
+}
+
+TEST_F(TileScheduleTest, first_pass_is_worth_more_the_coarser_the_level_it_replaces) {
+  schedule = TileSchedule({{10, 10}, {5, 5}, {3, 3}}, ScheduleOptions{});
+  auto fine = request(1, 0.1f), coarser = request(1, 0.1f);
+  coarser.tile = TileId(1, 1);
+  schedule.replace({coarser, fine}, nothing_stored);
+  const auto jobs = schedule.next_batch(100'000);
+  ASSERT_EQ(jobs.size(), 2u);
+  EXPECT_EQ(jobs[0].tile, fine.tile);
 }
 
 TEST_F(TileScheduleTest, stored_light_is_looked_at_before_anything_is_shaded) {
@@ -79,7 +99,7 @@ TEST_F(TileScheduleTest, stored_light_is_looked_at_before_anything_is_shaded) {
   EXPECT_EQ(jobs[0].passes, 0u);
   schedule.shaded(jobs[0].tile, at(5), 0);
   EXPECT_EQ(publish(), std::vector<std::uint32_t>{2});
-  EXPECT_EQ(run(100'000), std::vector<std::uint32_t>{1});
+  EXPECT_EQ(run(1), std::vector<std::uint32_t>{1});
 }
 
 TEST_F(TileScheduleTest, samples_go_where_weighted_error_is_largest) {
@@ -161,11 +181,11 @@ TEST_F(TileScheduleTest, newly_seen_texels_are_shaded_and_shown_at_once) {
 TEST_F(TileScheduleTest, neighbours_first_light_renews_the_border_when_all_is_calm) {
   schedule.replace({request(1, 0.9f), request(2, 0.1f), request(9, 0.01f)}, nothing_stored);
   run(1);
-  EXPECT_EQ(publish(), std::vector<std::uint32_t>{1});
+  EXPECT_EQ(publish(0.001f), std::vector<std::uint32_t>{1});
   run(1);
-  EXPECT_EQ(publish(), std::vector<std::uint32_t>{2});
+  EXPECT_EQ(publish(0.001f), std::vector<std::uint32_t>{2});
   run(1);  // no first pass waits any longer
-  EXPECT_EQ(publish(), (std::vector<std::uint32_t>{1, 9}));
+  EXPECT_EQ(publish(0.001f), (std::vector<std::uint32_t>{1, 9}));
 }
 
 TEST_F(TileScheduleTest, border_tiles_are_shaded_but_have_no_picture) {
