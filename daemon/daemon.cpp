@@ -8,20 +8,12 @@
 #include <thread>
 #include <utility>
 
-#include "actors/encoder/coarse_encoder_actor.hpp"
-#include "actors/encoder/encoder_actor.hpp"
-#include "actors/renderer/renderer_actor.hpp"
-#include "actors/renderer/tile_surface_scene.hpp"
-#include "actors/renderer/view_renderer_actor.hpp"
-#include "actors/renderer/view_surface_scene.hpp"
-#include "actors/runtime/registry.hpp"
 #include "actors/runtime/threaded_system.hpp"
 #include "actors/session/session_actor.hpp"
 #include "actors/session/tcp_listener.hpp"
 #include "actors/session/udp_listener.hpp"
-#include "actors/tile_scheduler/tile_scheduler_actor.hpp"
-#include "daemon/late_ref.hpp"
 #include "daemon/observe/prometheus_sink.hpp"
+#include "daemon/pipeline.hpp"
 #include "daemon/scene_setup.hpp"
 #include "daemon/stream_directory.hpp"
 #include "proto/darm.pb.h"
@@ -29,37 +21,9 @@
 namespace darm {
 namespace {
 
-using Sessions = runtime::Registry<SessionId, session::Inbox>;
 using Work = boost::asio::executor_work_guard<boost::asio::io_context::executor_type>;
 
-constexpr std::size_t kMailbox = 4096;
-constexpr Microseconds kRefineInterval = 300'000;
 constexpr auto kGoodbyeTime = std::chrono::milliseconds(1500);
-
-tile_scheduler::SchedulerOptions scheduler_options(const config::Config& config) {
-  tile_scheduler::SchedulerOptions options;
-  options.updates_per_second = config.stream.updates_per_second;
-  options.stream.max_writes = config.stream.max_writes;
-  options.stream.refine_interval = kRefineInterval;
-  return options;
-}
-
-renderer::RendererOptions renderer_options(const config::Config& config, float exposure) {
-  renderer::RendererOptions options;
-  options.display.exposure = exposure;
-  options.display.filter_samples = static_cast<float>(config.accuracy.filter_samples);
-  options.schedule.max_samples = config.render.max_samples;
-  options.slice_ms = static_cast<float>(config.render.slice_ms);
-  return options;
-}
-
-renderer::ViewRendererOptions view_options(const config::Config& config, float exposure) {
-  renderer::ViewRendererOptions options;
-  options.tile.exposure = exposure;
-  options.tile.max_samples = static_cast<float>(config.render.max_samples);
-  options.slice_ms = static_cast<float>(config.render.slice_ms);
-  return options;
-}
 
 session::SessionPolicy session_policy(const config::Config& config, const World& world) {
   session::SessionPolicy policy;
@@ -78,31 +42,6 @@ session::SessionPolicy session_policy(const config::Config& config, const World&
   return policy;
 }
 
-std::shared_ptr<const tile_scheduler::CoarseLuma> luma_of(const renderer::CoarsePicture& picture) {
-  auto out = std::make_shared<tile_scheduler::CoarseLuma>();
-  out->width = picture.width;
-  out->height = picture.height;
-  out->luma.reserve(picture.rgb.size() / 3);
-  for (std::size_t i = 0; i + 2 < picture.rgb.size(); i += 3)
-    out->luma.push_back(static_cast<std::uint8_t>(
-        (13933 * picture.rgb[i] + 46871 * picture.rgb[i + 1] + 4732 * picture.rgb[i + 2] + 32768) >> 16));  // BT.709
-  return out;
-}
-
-encoder::EncoderOptions encoder_options(const config::Config& config, StreamId stream,
-                                        const tile_scheduler::StreamFormat& format) {
-  encoder::EncoderOptions options;
-  options.stream = stream;
-  options.layer = format.layer;
-  options.phystex_size = format.phystex_size;
-  options.chroma_444 = format.chroma_444;
-  options.lossless_rgb = format.lossless_rgb;
-  options.crf = static_cast<float>(config.stream.crf);
-  options.preset = config.stream.preset;
-  options.frames_per_second = static_cast<float>(config.stream.updates_per_second);
-  return options;
-}
-
 }  // namespace
 
 struct Daemon::Parts {
@@ -112,11 +51,9 @@ struct Daemon::Parts {
   observe::PrometheusSink metrics;
   std::optional<observe::Health> health;
   World world;
-  std::shared_ptr<Sessions> sessions = std::make_shared<Sessions>();
-  std::shared_ptr<StreamDirectory> streams = std::make_shared<StreamDirectory>(sessions);
+  std::shared_ptr<StreamDirectory::Sessions> sessions = std::make_shared<StreamDirectory::Sessions>();
   std::unique_ptr<runtime::ThreadedSystem> system;
-  runtime::Ref<tile_scheduler::Inbox> scheduler;
-  runtime::Ref<encoder::CoarseInbox> coarse;
+  Pipeline pipeline;
   std::shared_ptr<session::SessionSurroundings> surroundings;
   boost::asio::io_context io;
   std::optional<Work> io_work;
@@ -125,10 +62,6 @@ struct Daemon::Parts {
   std::thread io_thread;
 
   void fill_supervision(const std::function<void(const std::string&)>& on_fatal);
-  void spawn_actors();
-  [[nodiscard]] tile_scheduler::Peers make_peers(std::shared_ptr<LateRef<renderer::Inbox>> renderer,
-                                                 std::shared_ptr<LateRef<renderer::ViewInbox>> view_renderer);
-  void spawn_view_renderer(LateRef<renderer::ViewInbox>& ref);
   [[nodiscard]] Result<Addresses> listen();
 };
 
@@ -156,77 +89,14 @@ void Daemon::Parts::fill_supervision(const std::function<void(const std::string&
   table.on_escalate([on_fatal](const Failure& failure) { on_fatal(failure.actor + ": " + failure.what); });
 }
 
-tile_scheduler::Peers Daemon::Parts::make_peers(std::shared_ptr<LateRef<renderer::Inbox>> renderer,
-                                                std::shared_ptr<LateRef<renderer::ViewInbox>> view_renderer) {
-  tile_scheduler::Peers peers;
-  if (world.view_materials) peers.view_renderer = [view_renderer] { return view_renderer->get(); };
-  peers.renderer = [renderer] { return renderer->get(); };
-  peers.make_encoder = [this](StreamId stream, const tile_scheduler::StreamFormat& format) {
-    auto receivers = [streams = streams, stream] { return streams->receivers(stream); };
-    return system->spawn<encoder::EncoderActor>("encoder/" + std::to_string(static_cast<std::uint32_t>(stream)), 16,
-                                                encoder_options(config, stream, format), std::move(receivers),
-                                                scheduler, metrics);
-  };
-  peers.destroy_encoder = [this](StreamId, const runtime::Ref<encoder::Inbox>& encoder) { system->stop(encoder); };
-  peers.set_receivers = [streams = streams](StreamId stream, std::vector<SessionId> receivers) {
-    streams->set(stream, std::move(receivers));
-  };
-  peers.sessions = sessions;
-  return peers;
-}
-
-// Only where the scene calls for it: else there is no such actor.
-void Daemon::Parts::spawn_view_renderer(LateRef<renderer::ViewInbox>& ref) {
-  if (!world.view_materials) return;
-  renderer::ViewRendererParts parts;
-  parts.surfaces = renderer::make_view_surfaces(world.scene, world.mapper, world.transport, seed);
-  parts.options = view_options(config, world.exposure);
-  parts.scheduler = scheduler;
-  parts.metrics = &metrics;
-  ref.set(system->spawn<renderer::ViewRendererActor>("view_renderer", 1024, std::move(parts)));
-}
-
-void Daemon::Parts::spawn_actors() {
-  coarse = system->spawn<encoder::CoarseEncoderActor>("coarse_encoder", 64, sessions, encoder::CoarseStillOptions{},
-                                                      metrics);
-  auto renderer_ref = std::make_shared<LateRef<renderer::Inbox>>();
-  auto view_ref = std::make_shared<LateRef<renderer::ViewInbox>>();
-  auto peers = std::make_shared<tile_scheduler::Peers>(make_peers(renderer_ref, view_ref));
-  scheduler =
-      system->spawn<tile_scheduler::TileSchedulerActor>("tile_scheduler", kMailbox, world.layout, world.rays, peers,
-                                                        scheduler_options(config), metrics, world.view_materials);
-  spawn_view_renderer(*view_ref);
-  renderer::RendererParts parts;
-  parts.surfaces = renderer::make_scene_surfaces(world.scene, world.mapper, world.transport, seed);
-  parts.store = world.store;
-  parts.levels = renderer::level_tiles_of(*world.layout);
-  if (config.accuracy.indirect == "stored") parts.layout = world.layout;
-  parts.options = renderer_options(config, world.exposure);
-  parts.scheduler = scheduler;
-  parts.metrics = &metrics;
-  parts.coarse = [to = coarse, to_scheduler = scheduler](const std::shared_ptr<const renderer::CoarsePicture>& from) {
-    auto picture = std::make_shared<encoder::CoarsePicture>();
-    picture->version = from->version;
-    picture->width = from->width;
-    picture->height = from->height;
-    picture->rgb = from->rgb;
-    to.tell(encoder::CoarseShaded(std::move(picture)));
-    to_scheduler.tell(tile_scheduler::CoarsePictured(luma_of(*from)));
-  };
-  parts.light = [view_ref](std::shared_ptr<const renderer::StoredLight> light) {
-    view_ref->get().tell(renderer::LightStored(std::move(light)));
-  };
-  renderer_ref->set(system->spawn<renderer::RendererActor>("renderer", 1024, std::move(parts)));
-}
-
 Result<Addresses> Daemon::Parts::listen() {
   Addresses addresses;
   addresses.metrics_url = metrics.url();
   surroundings = std::make_shared<session::SessionSurroundings>();
   surroundings->policy = session_policy(config, world);
   surroundings->scene = world.geometry;
-  surroundings->scheduler = scheduler;
-  surroundings->coarse = coarse;
+  surroundings->scheduler = pipeline.scheduler;
+  surroundings->coarse = pipeline.coarse;
   surroundings->sessions = sessions;
   surroundings->metrics = &metrics;
   surroundings->log = [](SessionId id, const std::string& text) {
@@ -269,7 +139,8 @@ Result<Addresses> Daemon::start(const std::function<void(const std::string&)>& o
   options.metrics = &parts.metrics;
   parts.system = std::make_unique<runtime::ThreadedSystem>(options);
   parts.fill_supervision(on_fatal);
-  parts.spawn_actors();
+  parts.pipeline =
+      spawn_pipeline(*parts.system, parts.world, parts.config, {parts.seed, parts.sessions, &parts.metrics, {}});
   auto addresses = parts.listen();
   if (addresses) parts.health->set_ready(true);
   return addresses;

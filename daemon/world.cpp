@@ -54,7 +54,7 @@ unsigned thread_count(const config::Config& config) {
   return config.render.threads != 0 ? config.render.threads : std::max(1u, std::thread::hardware_concurrency());
 }
 
-Result<World> build_world(const config::Config& config, unsigned threads) {
+Result<World> load_world(const config::Config& config, unsigned threads) {
   World world;
   if (auto made = make_state_dir(config.state.dir); !made) return std::unexpected(made.error());
 
@@ -90,16 +90,29 @@ Result<World> build_world(const config::Config& config, unsigned threads) {
   auto view = std::make_shared<const std::vector<scene::ViewMaterial>>(scene::view_materials(*world.scene));
   if (scene::calls_for_view_layer(*view)) world.view_materials = std::move(view);
   spdlog::info("private layer: {}", world.view_materials ? "for sessions that can take one" : "nothing calls for it");
+  return world;
+}
 
-  start = Clock::now();
+Result<std::shared_ptr<atlas::RadianceStore>> open_store(const config::Config& config, const World& world,
+                                                         const std::filesystem::path& folder) {
+  auto store = atlas::RadianceStore::open(folder, {world.scene->hash, world.layout->hash, light_key(config)},
+                                          *world.layout, {config.state.max_store_bytes});
+  if (!store) return std::unexpected(store.error());
+  return std::shared_ptr<atlas::RadianceStore>(std::move(*store));
+}
+
+Result<World> build_world(const config::Config& config, unsigned threads) {
+  auto made = load_world(config, threads);
+  if (!made) return made;
+  World& world = *made;
+  const auto start = Clock::now();
   auto geometry = session::GeometryStream::build(*world.scene, *world.layout, world.exposure, threads);
   if (!geometry) return std::unexpected(geometry.error());
   world.geometry = std::move(*geometry);
   spdlog::info("geometry: {} chunks, {:.2f} MB in {:.2f} s, exposure {:.4g}", world.geometry->chunk_count(),
                static_cast<double>(world.geometry->total_bytes()) * 1e-6, seconds_since(start), world.exposure);
 
-  auto store = atlas::RadianceStore::open(config.state.dir, {world.scene->hash, world.layout->hash, light_key(config)},
-                                          *world.layout, {config.state.max_store_bytes});
+  auto store = open_store(config, world, config.state.dir);
   if (!store) return std::unexpected(store.error());
   world.store = std::move(*store);
   const auto path = world.store->path().string();
@@ -113,7 +126,7 @@ Result<World> build_world(const config::Config& config, unsigned threads) {
     spdlog::warn("radiance store: {}: its {} bytes are over state.max_store_bytes = {}; it is used and does not grow",
                  path, stored.bytes, config.state.max_store_bytes);
   spdlog::info("radiance store: {} tiles in {}", stored.tiles, path);
-  return world;
+  return made;
 }
 
 }  // namespace darm

@@ -1,6 +1,7 @@
 // Everything that is fixed once the scene is loaded: what the actors of one daemon share.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,6 +34,13 @@ struct World {
 /// Loads scene, layout (from the state directory where it is cached), rays, geometry and store; says how far it is in
 /// the log. Uses `threads` threads, which have ended when it returns.
 [[nodiscard]] Result<World> build_world(const config::Config& config, unsigned threads);
+
+/// The same without `geometry`, which only clients need, and without `store`.
+[[nodiscard]] Result<World> load_world(const config::Config& config, unsigned threads);
+
+/// The store of the world's light in `folder`, which must be there: the one that was left there, or an empty one.
+[[nodiscard]] Result<std::shared_ptr<atlas::RadianceStore>> open_store(const config::Config& config, const World& world,
+                                                                       const std::filesystem::path& folder);
 
 /// Threads for long work that the configuration asks for: at least 1.
 [[nodiscard]] unsigned thread_count(const config::Config& config);
