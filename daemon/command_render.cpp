@@ -7,6 +7,7 @@
 #include "actors/renderer/exposure.hpp"
 #include "actors/renderer/reference_renderer.hpp"
 #include "daemon/commands.hpp"
+#include "daemon/reference_file.hpp"
 #include "daemon/scene_setup.hpp"
 
 namespace darm {
@@ -15,16 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t kMostSamples = 1u << 20;
-
-/// The sums of a picture outlive the run beside the other caches, so that the same command goes on where it stopped.
-/// Named by what they depend on, not by the words of the command: a named camera may be moved.
-fs::path state_file(const fs::path& folder, const renderer::LightTransport& transport,
-                    const renderer::ReferenceJob& job) {
-  char name[40];
-  std::snprintf(name, sizeof name, "reference-%016llx.bin",
-                static_cast<unsigned long long>(renderer::reference_hash(transport, job)));
-  return folder / name;
-}
 
 void warn(const std::string& what) { std::fprintf(stderr, "darmd render: warning: %s\n", what.c_str()); }
 
@@ -68,7 +59,7 @@ Result<nlohmann::json> render(const RenderCommand& command) {
   job.threads = threads;
   std::error_code made;
   fs::create_directories(command.config.state.dir, made);
-  job.state_file = state_file(command.config.state.dir, transport, job);
+  job.state_file = reference_file(command.config.state.dir, transport, job);
   job.warn = warn;
   if (!command.json) job.progress = report_progress;
   auto picture = renderer::render_reference(transport, job);
