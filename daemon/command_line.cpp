@@ -166,6 +166,27 @@ void add_render(CLI::App& app, RenderCommand& command, Common& common, std::stri
   });
 }
 
+void add_accuracy(CLI::App& app, AccuracyCommand& command, Common& common, std::string& size) {
+  common.add_to(app, true);
+  app.add_option("--out", command.out, "folder of the report; results that are in it are not measured again")
+      ->required()
+      ->check(kNotEmpty);
+  app.add_option("--cameras,--camera", command.cameras,
+                 "\"px,py,pz tx,ty,tz fovy\" or a name, one or more (default: the first of the set-up)")
+      ->expected(1, 64);
+  app.add_option("--seconds", command.seconds, "length of a run; the balanced preset and camera frames take two")
+      ->check(number(0.5, 3600, false))
+      ->capture_default_str();
+  app.add_option("--only", command.only,
+                 "groups (presets, q, samples, indirect, filter, layers, frames, codec, effects) or variants by name")
+      ->delimiter(',');
+  app.add_option("--size", size, "picture size")->check(kSize);
+  app.add_option("--reference-psnr", command.reference_psnr, "the references' own accuracy, dB")
+      ->check(number(1, 100, false))
+      ->capture_default_str();
+  app.add_flag("--json", command.json, "accuracy.json on standard output, no progress");
+}
+
 }  // namespace
 
 Command parse_command_line(int argc, char** argv) {
@@ -189,6 +210,11 @@ Command parse_command_line(int argc, char** argv) {
   auto* render_app = app.add_subcommand("render", "path-trace an unbiased reference picture");
   add_render(*render_app, render, render_common, size, effects);
 
+  AccuracyCommand accuracy;
+  Common accuracy_common;
+  auto* accuracy_app = app.add_subcommand("accuracy", "measure what accuracy costs in time, and write a report");
+  add_accuracy(*accuracy_app, accuracy, accuracy_common, size);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -199,13 +225,20 @@ Command parse_command_line(int argc, char** argv) {
     if (!config) return Exit{1};
     return ServeCommand{std::move(*config), serve.seed};
   }
-  const Common& common = inspect_app->parsed() ? inspect_common : render_common;
+  const Common& common = inspect_app->parsed()  ? inspect_common
+                         : render_app->parsed() ? render_common
+                                                : accuracy_common;
   auto config = configure(common, nullptr);
   if (!config) return Exit{1};
   if (inspect_app->parsed()) {
     inspect.config = std::move(*config);
     parse_size(size, inspect.width, inspect.height);
     return inspect;
+  }
+  if (accuracy_app->parsed()) {
+    accuracy.config = std::move(*config);
+    parse_size(size, accuracy.width, accuracy.height);
+    return accuracy;
   }
   render.config = std::move(*config);
   render.view_independent = effects == "view-independent";

@@ -41,12 +41,25 @@ struct RenderCommand {
   bool json = false;
 };
 
+/// darmd accuracy
+struct AccuracyCommand {
+  config::Config config;
+  std::vector<std::string> cameras;  ///< SPECs; none: the first of the set-up
+  std::vector<std::string> only;     ///< groups or variants; none: all
+  std::filesystem::path out;         ///< folder
+  double seconds = 16;               ///< of an atlas run
+  double reference_psnr = 40;        ///< dB
+  std::uint32_t width = 1280;
+  std::uint32_t height = 720;
+  bool json = false;
+};
+
 /// Nothing to run: help, version or a fault has been printed; the process ends with `code`.
 struct Exit {
   int code = 0;
 };
 
-using Command = std::variant<ServeCommand, InspectCommand, RenderCommand, Exit>;
+using Command = std::variant<ServeCommand, InspectCommand, RenderCommand, AccuracyCommand, Exit>;
 
 /// Parses the command line and loads the configuration it names; overrides are applied and checked. All faults of the
 /// configuration are printed at once, to standard error.

@@ -8,6 +8,7 @@ namespace darm {
 [[nodiscard]] int run(const ServeCommand& command);
 [[nodiscard]] int run(const InspectCommand& command);
 [[nodiscard]] int run(const RenderCommand& command);
+[[nodiscard]] int run(const AccuracyCommand& command);
 [[nodiscard]] inline int run(const Exit& command) { return command.code; }
 
 }  // namespace darm

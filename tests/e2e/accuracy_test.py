@@ -1,0 +1,107 @@
+"""darmd accuracy: a small study of the default scene, resumed, changed and cut off."""
+import csv
+import json
+import signal
+import subprocess
+import unittest
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+from running import BIN, SET_UP, Folder, wait_until
+
+
+class Accuracy(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = Folder()
+        cls.state = Path(folder.__enter__())  # layouts and reference are made once
+        cls.addClassCleanup(folder.__exit__)
+
+    def setUp(self):
+        folder = Folder()
+        self.folder = Path(folder.__enter__())
+        self.addCleanup(folder.__exit__)
+        self.out = self.folder / "out"
+
+    def command(self, *more):
+        return [BIN / "darmd", "accuracy", "--config", SET_UP, "--cameras", "hall", "--size", "128x72", "--q", "16",
+                "--seconds", "2", "--reference-psnr", "33", "--state-dir", self.state, "--out", self.out,
+                *more]
+
+    def study(self, *more):
+        """A run that must succeed: (its report, what it said)."""
+        done = subprocess.run(self.command(*more), capture_output=True, text=True, timeout=200)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads((self.out / "accuracy.json").read_text()), done.stdout
+
+    def curves(self, report):
+        return {m["variant"]: m["curve"] for m in report["measurements"]}
+
+    def test_worse_knobs_give_worse_pictures_and_a_rerun_measures_nothing(self):
+        chosen = ("--only", "balanced,camera frames,filter,q 8,codec,sky,all indirect light,all but 4 bounces")
+        report, said = self.study(*chosen)
+        self.assertIn("11 measured, 0 from before", said)
+        last = {name: curve[-1]["db"] for name, curve in self.curves(report).items() if curve}
+        self.assertGreater(last["balanced"], 25)  # the scene is recognised
+        self.assertGreater(last["balanced"], last["no filter"] + 1)
+        self.assertGreater(last["balanced"], last["q 8"] + 1)
+        self.assertGreater(last["balanced"], self.curves(report)["balanced"][0]["db"] + 1)
+        figures = {m["variant"]: m["figures"] for m in report["measurements"]}
+        for finer, coarser in (("crf 14", "crf 18"), ("crf 18", "crf 23"), ("crf 23", "crf 28")):
+            self.assertGreater(figures[finer]["first_codec_db"], figures[coarser]["first_codec_db"])
+            self.assertGreater(figures[finer]["first_bytes"], figures[coarser]["first_bytes"])
+        self.assertLess(figures["all indirect light"]["without_db"], figures["all but 4 bounces"]["without_db"])
+        self.assertLess(figures["all indirect light"]["seconds_without"], figures["all indirect light"]["seconds_with"])
+        self.check_files(report)
+        before = (self.out / "results.jsonl").read_bytes()
+        again, said = self.study(*chosen)
+        self.assertIn("0 measured, 11 from before", said)
+        self.assertEqual((self.out / "results.jsonl").read_bytes(), before)
+        self.assertEqual(again["measurements"], report["measurements"])
+
+    def check_files(self, report):
+        xml.fromstring((self.out / "accuracy.html").read_text().removeprefix("<!DOCTYPE html>"))
+        pictures = list(self.out.glob("pictures/*.svg"))
+        self.assertGreater(len(pictures), 2)
+        for picture in pictures:
+            xml.parse(picture)
+            self.assertIn(f"(pictures/{picture.name})", (self.out / "accuracy.md").read_text())
+        with open(self.out / "curves.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(len(rows), sum(len(m["curve"]) for m in report["measurements"]))
+        self.assertFalse((self.out / "run").exists())  # radiance stores are gone
+        self.assertFalse((self.out / "frames.bin").exists())
+
+    def test_a_changed_set_up_is_measured_anew(self):
+        self.study("--only", "sky")
+        darker = self.folder / "darker.toml"
+        darker.write_text("[sky]\nzenith = 1.0\nhorizon = 1.0\nground = 0.5\n")
+        report, said = self.study("--only", "sky", "--config", darker)
+        self.assertIn("1 measured, 0 from before", said)
+        self.assertEqual(len(report["measurements"]), 1)
+
+    def test_an_interrupted_run_keeps_what_is_done_and_goes_on(self):
+        running = subprocess.Popen(self.command("--only", "sky,balanced,filter"), stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        results = self.out / "results.jsonl"
+        wait_until(lambda: results.exists() and results.stat().st_size > 0, 100, "a first result")
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=30)
+        self.assertEqual(running.returncode, 130, said)
+        self.assertIn("goes on where it stopped", said)
+        self.assertFalse((self.out / "run").exists())
+        done = len(results.read_text().splitlines())
+        self.assertLess(done, 3)
+        _, said = self.study("--only", "sky,balanced,filter")
+        self.assertIn(f"{3 - done} measured, {done} from before", said)
+
+    def test_what_cannot_be_done_is_one_clear_line(self):
+        for more, words in ((("--only", "everything"), "groups are presets, q"), (("--cameras", "nowhere"), "nowhere")):
+            done = subprocess.run(self.command(*more), capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 1)
+            self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+            self.assertIn(words, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
