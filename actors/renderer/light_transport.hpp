@@ -1,51 +1,25 @@
 // How light travels: the one definition of view-independent light, used by reference and atlas alike.
 #pragma once
 
-#include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
 
 #include "actors/renderer/bsdf.hpp"
-#include "actors/renderer/light_set.hpp"
+#include "actors/renderer/integrator.hpp"
 #include "actors/renderer/material_point.hpp"
-#include "actors/renderer/sampler.hpp"
-#include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/trace/ray_scene.hpp"
+#include "actors/scene/effect_plan.hpp"
 #include "actors/scene/scene.hpp"
 #include "actors/types/surface_point.hpp"
 
 namespace darm::renderer {
 
-/// Radiance in nits. `sharp`: own emission, suns and point lights, each behind one shadow ray. `soft`: sky, emissive
-/// surfaces, interreflection. Finite, >= 0.
-struct ViewIndependentLight {
-  glm::vec3 sharp{0.0f};
-  glm::vec3 soft{0.0f};
-  [[nodiscard]] glm::vec3 sum() const { return sharp + soft; }
-};
-
-/// One sample of what leaves a point for one eye alone, and how fast it changes with the eye.
-struct ViewDependentLight {
-  glm::vec3 radiance{0.0f};  ///< nits; finite, >= 0
-  float diffuse_factor = 1;  ///< what the diffuse part of view_independent() is multiplied with for this eye
-  float ggx_alpha = 1;       ///< of the lobes
-  float distance = 0;        ///< to the eye, metres
-};
-
-/// Switches of the estimator. None changes the expectation, except for a `max_bounces` that cuts paths short.
-struct TransportOptions {
-  std::uint32_t max_bounces = 32;    ///< scatterings after the first vertex
-  std::uint32_t roulette_after = 1;  ///< paths may end by chance from this bounce on
-  /// For tests of multiple importance sampling: take emissive surfaces by one strategy only.
-  enum class Emitters : std::uint8_t { kBoth, kByLight, kByDirection };
-  Emitters emitters = Emitters::kBoth;
-};
-
 /// Path tracing with next-event estimation and MIS (power heuristic). Stateless: thread-safe, results depend on the
-/// arguments alone.
-/// Rules: shadow and bounce rays that meet the back of a single-sided triangle are blocked and see black, but for the
-/// share that BLEND or clear material lets through, and for the inside of refracting volumes. Refracting volumes block
-/// shadow rays; light crosses them on sampled paths.
+/// arguments alone. The scene's effect plan chooses, once, the integrator whose code holds what it calls for; the light
+/// is the same as with everything on, bit by bit. A scene that has changed is a new Scene and needs a new
+/// LightTransport. Rules: shadow and bounce rays that meet the back of a single-sided triangle are blocked and see
+/// black, but for the share that BLEND or clear material lets through, and for the inside of refracting volumes.
+/// Refracting volumes block shadow rays; light crosses them on sampled paths.
 class LightTransport {
  public:
   LightTransport(std::shared_ptr<const scene::Scene> scene, std::shared_ptr<const trace::RayScene> rays,
@@ -96,38 +70,19 @@ class LightTransport {
   /// times MaterialPoint::view_independent_transparency; sky and sun's disc where nothing is hit. Volumes are opaque.
   [[nodiscard]] glm::vec3 view_independent_radiance(const trace::Ray& ray, Sampler& sampler) const;
 
-  [[nodiscard]] const trace::RayScene& rays() const { return *rays_; }
-  [[nodiscard]] const LightSet& lights() const { return lights_; }
+  [[nodiscard]] const trace::RayScene& rays() const { return *world_->rays; }
+  [[nodiscard]] const LightSet& lights() const { return world_->lights; }
+  [[nodiscard]] const std::shared_ptr<const scene::Scene>& scene() const { return world_->scene; }
+  [[nodiscard]] const std::shared_ptr<const trace::RayScene>& share_rays() const { return world_->rays; }
+  [[nodiscard]] const TransportOptions& options() const { return world_->options; }
+  [[nodiscard]] const scene::EffectPlan& plan() const { return plan_; }
+  /// Those whose code runs: at least what the plan calls for.
+  [[nodiscard]] Effects effects() const { return integrator_->effects(); }
 
  private:
-  struct Path;
-
-  [[nodiscard]] static bool sees_black(const scene::Material& material, bool front);
-  [[nodiscard]] static bool sees_black(const trace::Surface& s) { return sees_black(*s.placed->material, s.front); }
-  [[nodiscard]] glm::vec3 sharp_diffuse(const trace::Surface& s, Sampler& sampler) const;
-  [[nodiscard]] glm::vec3 soft_diffuse(const trace::Surface& s, Sampler& sampler, const StoredLight* stored) const;
-  [[nodiscard]] glm::vec3 visibility(const trace::Surface& s, const glm::vec3& direction,
-                                     const glm::vec3* target) const;
-  template <class Scatter>
-  [[nodiscard]] glm::vec3 suns_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
-  template <class Scatter>
-  [[nodiscard]] glm::vec3 punctual_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler,
-                                      std::size_t picks) const;
-  template <class Scatter>
-  [[nodiscard]] glm::vec3 emitters_at(const trace::Surface& s, const Scatter& scatter, Sampler& sampler) const;
-  [[nodiscard]] glm::vec3 trace_path(Path path, Sampler& sampler) const;
-  [[nodiscard]] bool end_in_stored_light(Path& path, const trace::Surface& s, const MaterialPoint& m, Bsdf& scatter,
-                                         Sampler& sampler, glm::vec3& light) const;
-  [[nodiscard]] bool next_surface(Path& path, trace::Surface& s, MaterialPoint& m, Sampler& sampler) const;
-  [[nodiscard]] glm::vec3 background(const Path& path) const;
-  [[nodiscard]] glm::vec3 emission_seen(const Path& path, const trace::Surface& s, const MaterialPoint& m) const;
-
-  std::shared_ptr<const scene::Scene> scene_;
-  std::shared_ptr<const trace::RayScene> rays_;
-  TransportOptions options_;
-  LightSet lights_;
-  bool any_passing_ = false;  // some material lets rays pass: BLEND or thin and clear
-  bool has_sky_ = false;
+  std::shared_ptr<const TransportWorld> world_;
+  scene::EffectPlan plan_;
+  std::shared_ptr<const Integrator> integrator_;
 };
 
 }  // namespace darm::renderer

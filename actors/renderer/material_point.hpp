@@ -2,10 +2,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <glm/vec3.hpp>
 
+#include "actors/renderer/effects.hpp"
+#include "actors/renderer/trace/effect_tally.hpp"
 #include "actors/renderer/trace/surface.hpp"
 #include "actors/scene/scene.hpp"
+#include "actors/scene/texture_sampling.hpp"
 
 namespace darm::renderer {
 
@@ -48,6 +52,14 @@ struct MaterialPoint {
     return f0 + (1.0f - f0) * m2 * m2 * m;
   }
 
+  /// What specular lobes reflect in all, seen from outside: Fresnel's of the dielectric share, Schlick's of the metal.
+  [[nodiscard]] glm::vec3 reflectance(float cosine) const {
+    const float m = std::clamp(1.0f - cosine, 0.0f, 1.0f);
+    const float m5 = m * m * m * m * m;
+    const glm::vec3 metal = base + (glm::vec3(1.0f) - base) * m5;
+    return glm::vec3((1.0f - metallic) * fresnel(cosine)) + metal * metallic;
+  }
+
   /// What the diffuse lobe reflects, the view averaged out: mean of 1 - F over cosine-weighted outgoing directions,
   /// 1 - F0 - (1 - F0) / 21 for Schlick's formula (analytic: integral of 2 c (1 - c)^5 is 1/21).
   [[nodiscard]] glm::vec3 diffuse_albedo() const {
@@ -69,6 +81,79 @@ struct MaterialPoint {
   }
 };
 
+/// A point of a triangle: (1 - u - v, u, v).
+struct TrianglePoint {
+  std::uint32_t triangle;
+  float u, v;
+};
+
+/// What of a material the effects `fx` look at. `textures` must be of the same point; not looked at without
+/// fx.textures. In the header for the integrators, whose inner loops it is part of.
+template <Effects fx>
+[[nodiscard]] MaterialPoint read_material(const scene::Scene& scene, const trace::WorldInstance& placed,
+                                          const TrianglePoint& at, const scene::HitTextures& textures,
+                                          EffectTally& tally) {
+  using scene::TextureEncoding;
+  using Set = scene::TextureSet;
+  const auto& m = *placed.material;
+  const auto& mesh = *placed.mesh;
+  const auto read_rarer = [&](const scene::TextureRef& texture, TextureEncoding encoding) {
+    tally.add(EffectKind::kTextures);
+    return scene::sample(scene, texture, mesh, at.triangle, at.u, at.v, encoding);
+  };
+  glm::vec4 base = m.base_color;
+  if constexpr (fx.textures) {
+    if (textures.has(Set::kBaseColor)) {
+      tally.add(EffectKind::kTextures);
+      base *= textures.read(Set::kBaseColor, TextureEncoding::kSrgb);
+    }
+    if (!mesh.colors.empty()) {
+      tally.add(EffectKind::kVertexColors);
+      base *= scene::interpolate_color(mesh, at.triangle, at.u, at.v);
+    }
+  }
+  MaterialPoint p;
+  p.base = glm::clamp(glm::vec3(base), 0.0f, 1.0f);
+  if constexpr (fx.straight)
+    if (m.alpha_mode == scene::AlphaMode::kBlend) p.alpha = std::clamp(base.w, 0.0f, 1.0f);
+  if constexpr (fx.emitters) {
+    p.unlit = m.unlit;
+    if (m.unlit) {
+      p.emission = p.base;
+      return p;
+    }
+  }
+  float roughness = m.roughness;
+  if constexpr (fx.glossy) p.metallic = m.metallic;
+  if constexpr (fx.textures)
+    if (textures.has(Set::kMetallicRoughness)) {
+      tally.add(EffectKind::kTextures);
+      const glm::vec4 texel = textures.read(Set::kMetallicRoughness, TextureEncoding::kLinear);
+      roughness *= texel.y;
+      if constexpr (fx.glossy) p.metallic *= texel.z;
+    }
+  p.ggx_alpha = std::max(roughness * roughness, kSmallestAlpha);
+  p.ior = m.ior;
+  p.interface = fx.glossy && std::abs(m.ior - 1.0f) > 1e-4f;
+  const float ratio = (m.ior - 1.0f) / (m.ior + 1.0f);
+  p.f0 = ratio * ratio;
+  p.thin = m.thickness <= 0;
+  if constexpr (fx.transmission) {
+    p.transmission = m.transmission;
+    if (m.transmission > 0 && m.transmission_texture.present())
+      p.transmission *= read_rarer(m.transmission_texture, TextureEncoding::kLinear).x;
+  }
+  if constexpr (fx.emitters)
+    if (m.emits()) {
+      p.emission = m.emissive;
+      if constexpr (fx.textures)
+        if (m.emissive_texture.present())
+          p.emission *= glm::vec3(read_rarer(m.emissive_texture, TextureEncoding::kSrgb));
+    }
+  return p;
+}
+
+/// All of it.
 [[nodiscard]] MaterialPoint make_material_point(const scene::Scene& scene, const trace::WorldInstance& placed,
                                                 std::uint32_t triangle, float u, float v);
 [[nodiscard]] inline MaterialPoint make_material_point(const scene::Scene& scene, const trace::Surface& s) {

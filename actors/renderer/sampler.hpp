@@ -97,6 +97,9 @@ class Sampler {
     return {detail::to_unit(detail::reverse_bits(x)), detail::to_unit(detail::reverse_bits(y))};
   }
 
+  /// Leaves out one draw: the numbers that follow are the same as after taking it.
+  void skip() { ++draw_; }
+
  private:
   std::uint32_t key_;
   std::uint32_t reversed_index_;

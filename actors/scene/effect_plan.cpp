@@ -1,6 +1,7 @@
 #include "actors/scene/effect_plan.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "actors/scene/view_materials.hpp"
@@ -53,7 +54,8 @@ class Survey {
   }
   [[nodiscard]] std::size_t moving_bodies() const {
     std::vector<bool> moves(scene_.objects.size());
-    for (const Instance& i : scene_.instances) moves[i.object] = scene_.objects[i.object].dynamic;
+    for (const Instance& i : scene_.instances)
+      if (i.object < moves.size()) moves[i.object] = scene_.objects[i.object].dynamic;
     return static_cast<std::size_t>(std::ranges::count(moves, true));
   }
 
@@ -80,6 +82,9 @@ void plan_lights(Plan& plan, const Scene& scene, const Survey& survey) {
   plan.out.delta_lights = plan.add("delta lights", survey.lights(is_delta), "point, spot or directional light",
                                    "point, spot or directional lights");
   plan.out.area_lights = suns + emitters > 0;
+  plan.out.emitters = emitters > 0;
+  plan.out.suns = survey.lights([](const Light& l) { return l.kind == LightKind::kDirectional; }) > 0;
+  plan.out.lamps = survey.lights([](const Light& l) { return l.kind != LightKind::kDirectional; }) > 0;
   plan.out.effects.push_back({"area lights", plan.out.area_lights,
                               plan.out.area_lights ? counted(emitters, "emissive material", "emissive materials") +
                                                          ", " + counted(suns, "disc sun", "disc suns")
@@ -101,6 +106,10 @@ void plan_materials(Plan& plan, const Survey& survey) {
   // Every lit dielectric has a specular lobe; only an index of 1 switches it off.
   out.glossy_reflection = materials("glossy reflection", "with a specular lobe",
                                     [](const Material& m) { return !m.unlit && (m.metallic > 0.0f || m.ior != 1.0f); });
+  // Light goes straight through thin clear material, and through a volume without a boundary.
+  out.straight_passage = out.blending || survey.materials([](const Material& m) {
+    return m.transmission > 0.0f && (m.thickness <= 0.0f || std::abs(m.ior - 1.0f) <= 1e-4f);
+  }) > 0;
   out.transmission =
       materials("transmission", "that transmit light", [](const Material& m) { return m.transmission > 0.0f; });
   out.volume_attenuation = materials("volume attenuation", "with an absorbing volume", has_volume);

@@ -31,10 +31,17 @@ struct EffectPlan {
   bool textures = false;
   bool moving_lights = false;
   bool moving_bodies = false;
-  bool view_layer = false;      ///< enough of some surface's light depends on the eye (view_materials.hpp)
-  std::vector<Effect> effects;  ///< the same, in this order, with reasons
+  bool view_layer = false;  ///< enough of some surface's light depends on the eye (view_materials.hpp)
+  // Parts of the above that code can do without:
+  bool suns = false;              ///< directional lights, delta or disc
+  bool lamps = false;             ///< point and spot lights
+  bool emitters = false;          ///< emissive or unlit surfaces
+  bool straight_passage = false;  ///< BLEND, or clear material that light passes unbent
+  std::vector<Effect> effects;    ///< those with a name, in this order, with reasons
 };
 
+/// Pure: a scene that has changed (a light that moves, a body marked movable, a material that turns clear) is a new
+/// Scene with a plan of its own.
 [[nodiscard]] EffectPlan plan_effects(const Scene& scene);
 
 }  // namespace darm::scene

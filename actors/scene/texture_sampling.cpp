@@ -60,15 +60,6 @@ double reduced(float coordinate, Wrap wrap) {
   return c - std::floor(c);
 }
 
-/// The (up to) four texels that a texture coordinate reads, and how far it lies between them. Nearest: all four equal.
-struct Footprint {
-  const std::uint8_t* upper_left;
-  const std::uint8_t* upper_right;
-  const std::uint8_t* lower_left;
-  const std::uint8_t* lower_right;
-  float fx, fy;
-};
-
 /// `image` must have pixels.
 Footprint locate(const Image& image, const TextureRef& texture, const glm::vec2& uv) {
   const glm::mat3& t = texture.uv_transform;
@@ -85,16 +76,35 @@ Footprint locate(const Image& image, const TextureRef& texture, const glm::vec2&
   const auto iy = static_cast<std::int64_t>(top);
   const std::size_t x0 = wrapped(ix, image.width, texture.wrap_s);
   const std::size_t x1 = wrapped(ix + step, image.width, texture.wrap_s);
-  const std::uint8_t* row0 =
-      image.pixels.data() + std::size_t{wrapped(iy, image.height, texture.wrap_t)} * image.width * 4;
-  const std::uint8_t* row1 =
-      image.pixels.data() + std::size_t{wrapped(iy + step, image.height, texture.wrap_t)} * image.width * 4;
-  return {row0 + x0 * 4,
-          row0 + x1 * 4,
-          row1 + x0 * 4,
-          row1 + x1 * 4,
+  const std::size_t row0 = std::size_t{wrapped(iy, image.height, texture.wrap_t)} * image.width;
+  const std::size_t row1 = std::size_t{wrapped(iy + step, image.height, texture.wrap_t)} * image.width;
+  return {(row0 + x0) * 4,
+          (row0 + x1) * 4,
+          (row1 + x0) * 4,
+          (row1 + x1) * 4,
           texture.nearest ? 0.0f : static_cast<float>(x - left),
           texture.nearest ? 0.0f : static_cast<float>(y - top)};
+}
+
+glm::vec4 mix(const Image& image, const Footprint& f, TextureEncoding encoding) {
+  const auto& color = encoding == TextureEncoding::kSrgb ? kSrgbTable : kLinearTable;
+  const float w11 = f.fx * f.fy;
+  const float w10 = f.fx - w11;
+  const float w01 = f.fy - w11;
+  const float w00 = 1.0f - f.fx - w01;
+  const std::uint8_t* pixels = image.pixels.data();
+  const auto mixed = [&](std::size_t channel, const std::array<float, 256>& table) {
+    return table[pixels[f.upper_left + channel]] * w00 + table[pixels[f.upper_right + channel]] * w10 +
+           table[pixels[f.lower_left + channel]] * w01 + table[pixels[f.lower_right + channel]] * w11;
+  };
+  return {mixed(0, color), mixed(1, color), mixed(2, color), mixed(3, kLinearTable)};
+}
+
+bool read_alike(const TextureSet::Entry& a, const TextureSet::Entry& b) {
+  return a.texture->uv_set == b.texture->uv_set && a.texture->wrap_s == b.texture->wrap_s &&
+         a.texture->wrap_t == b.texture->wrap_t && a.texture->nearest == b.texture->nearest &&
+         a.texture->uv_transform == b.texture->uv_transform && a.image->width == b.image->width &&
+         a.image->height == b.image->height;
 }
 
 /// The image of a texture, or null if it has none or an empty one.
@@ -124,36 +134,50 @@ glm::vec4 interpolate_color(const Mesh& mesh, std::uint32_t triangle, float u, f
 glm::vec4 sample_at(const Scene& scene, const TextureRef& texture, glm::vec2 uv, TextureEncoding encoding) {
   const Image* image = image_of(scene, texture);
   if (image == nullptr) return glm::vec4(1.0f);
-  const Footprint f = locate(*image, texture, uv);
-  const auto& color = encoding == TextureEncoding::kSrgb ? kSrgbTable : kLinearTable;
-  const float w11 = f.fx * f.fy;
-  const float w10 = f.fx - w11;
-  const float w01 = f.fy - w11;
-  const float w00 = 1.0f - f.fx - w01;
-  const auto mixed = [&](std::size_t channel, const std::array<float, 256>& table) {
-    return table[f.upper_left[channel]] * w00 + table[f.upper_right[channel]] * w10 +
-           table[f.lower_left[channel]] * w01 + table[f.lower_right[channel]] * w11;
-  };
-  return {mixed(0, color), mixed(1, color), mixed(2, color), mixed(3, kLinearTable)};
+  return mix(*image, locate(*image, texture, uv), encoding);
 }
 
-void prefetch(const Scene& scene, const Material& material, const Mesh& mesh, std::uint32_t triangle, float u,
-              float v) {
-  const TextureRef* const textures[] = {&material.normal_texture, &material.base_color_texture,
-                                        &material.metallic_roughness_texture};
+TextureSet texture_set(const Scene& scene, const Material& material) {
+  TextureSet set;
+  const std::array<const TextureRef*, TextureSet::kSlots> textures = {
+      &material.normal_texture, &material.base_color_texture, &material.metallic_roughness_texture};
+  for (std::size_t slot = 0; slot < textures.size(); ++slot) {
+    auto& entry = set.entries[slot];
+    entry = {image_of(scene, *textures[slot]), textures[slot], static_cast<std::uint8_t>(slot)};
+    if (entry.image == nullptr) continue;
+    set.any = true;
+    for (std::size_t other = 0; other < slot; ++other) {
+      if (set.entries[other].image == nullptr || !read_alike(set.entries[other], entry)) continue;
+      entry.like = set.entries[other].like;
+      break;
+    }
+  }
+  return set;
+}
+
+void HitTextures::find(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
   int held = -1;
   glm::vec2 uv(0.0f);
-  for (const TextureRef* texture : textures) {
-    const Image* image = image_of(scene, *texture);
-    if (image == nullptr || image->pixels.size() < kStaysInCache) continue;
-    if (texture->uv_set != held) {
-      held = texture->uv_set;
-      uv = interpolate_uv(mesh, texture->uv_set, triangle, u, v);
+  for (std::size_t slot = 0; slot < TextureSet::kSlots; ++slot) {
+    const auto& entry = set_.entries[slot];
+    if (entry.image == nullptr) continue;
+    if (entry.like == slot) {
+      if (entry.texture->uv_set != held) {
+        held = entry.texture->uv_set;
+        uv = interpolate_uv(mesh, entry.texture->uv_set, triangle, u, v);
+      }
+      places_[slot] = locate(*entry.image, *entry.texture, uv);
     }
-    const Footprint f = locate(*image, *texture, uv);
-    __builtin_prefetch(f.upper_left);
-    __builtin_prefetch(f.lower_left);
+    if (entry.image->pixels.size() < kStaysInCache) continue;
+    const Footprint& place = places_[entry.like];
+    __builtin_prefetch(entry.image->pixels.data() + place.upper_left);
+    __builtin_prefetch(entry.image->pixels.data() + place.lower_left);
   }
+}
+
+glm::vec4 HitTextures::read(TextureSet::Slot slot, TextureEncoding encoding) const {
+  const auto& entry = set_.entries[slot];
+  return entry.image == nullptr ? glm::vec4(1.0f) : mix(*entry.image, places_[entry.like], encoding);
 }
 
 glm::vec4 sample(const Scene& scene, const TextureRef& texture, const Mesh& mesh, std::uint32_t triangle, float u,

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <string>
 
+#include "actors/renderer/trace/effect_tally.hpp"
 #include "actors/renderer/trace/surface.hpp"
 
 #if defined(__linux__)
@@ -46,6 +47,8 @@ void pass_masked(const RTCFilterFunctionNArguments* args) {
   const auto& instance = *static_cast<const RayScene*>(args->geometryUserPtr);
   const auto id = RTCHitN_geomID(args->hit, args->N, 0);
   const auto& placed = instance.instance(id);
+  thread_tally().add(EffectKind::kAlphaTest);
+  if (placed.material->alpha_mode != scene::AlphaMode::kMask) return;
   const float alpha = surface_alpha(instance.scene(), placed, RTCHitN_primID(args->hit, args->N, 0),
                                     RTCHitN_u(args->hit, args->N, 0), RTCHitN_v(args->hit, args->N, 0));
   if (alpha < placed.material->alpha_cutoff) args->valid[0] = 0;
@@ -141,7 +144,8 @@ Result<void> check_instance(const scene::Scene& scene, std::size_t index) {
 
 RayScene::~RayScene() = default;
 
-Result<std::shared_ptr<const RayScene>> RayScene::build(std::shared_ptr<const scene::Scene> scene, unsigned threads) {
+Result<std::shared_ptr<const RayScene>> RayScene::build(std::shared_ptr<const scene::Scene> scene, unsigned threads,
+                                                        Filters filters) {
   std::shared_ptr<RayScene> made(new RayScene);
   made->scene_ = scene;
   made->device_ = std::make_unique<Device>();
@@ -173,6 +177,7 @@ Result<std::shared_ptr<const RayScene>> RayScene::build(std::shared_ptr<const sc
     placed.normal_to_world =
         std::abs(determinant) > 0 ? glm::transpose(glm::inverse(placed.tangent_to_world)) : glm::mat3(1.0f);
     placed.handedness = instance.flipped ? -1.0f : 1.0f;
+    placed.textures = scene::texture_set(*scene, *placed.material);
     if (mesh.triangles.empty()) continue;
 
     RTCGeometry geometry = rtcNewGeometry(made->device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -181,8 +186,9 @@ Result<std::shared_ptr<const RayScene>> RayScene::build(std::shared_ptr<const sc
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                                sizeof(glm::uvec3), mesh.triangles.size());
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
-    if (placed.material->alpha_mode == scene::AlphaMode::kMask) {
-      made->has_masks_ = true;
+    const bool masked = placed.material->alpha_mode == scene::AlphaMode::kMask;
+    made->has_masks_ = made->has_masks_ || masked;
+    if (masked || filters == Filters::kEverywhere) {
       rtcSetGeometryUserData(geometry, made.get());
       rtcSetGeometryIntersectFilterFunction(geometry, pass_masked);
       rtcSetGeometryOccludedFilterFunction(geometry, pass_masked);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "actors/scene/scene.hpp"
+#include "actors/scene/texture_sampling.hpp"
 #include "actors/types/error.hpp"
 
 namespace darm::renderer::trace {
@@ -40,15 +41,20 @@ struct WorldInstance {
   glm::mat3 normal_to_world{1.0f};   ///< inverse transpose of the upper 3x3
   glm::mat3 tangent_to_world{1.0f};  ///< upper 3x3
   float handedness = 1.0f;           ///< -1 where the instance mirrors
+  scene::TextureSet textures;        ///< of the material
 };
 
 /// Immutable after build; every query is thread-safe and allocates nothing.
 class RayScene {
  public:
+  /// On which geometry the ray library calls back for each hit: where alpha MASK asks for it, or everywhere, as an
+  /// integrator would need that knew nothing of the scene (for comparison; rays find the same).
+  enum class Filters : std::uint8_t { kWhereMasked, kEverywhere };
   /// Builds the acceleration structure with `threads` threads (at least 1). An empty scene is fine: nothing is hit.
   /// Errors: an instance or triangle that points outside its arrays; out of memory.
   [[nodiscard]] static Result<std::shared_ptr<const RayScene>> build(std::shared_ptr<const scene::Scene> scene,
-                                                                     unsigned threads);
+                                                                     unsigned threads,
+                                                                     Filters filters = Filters::kWhereMasked);
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;

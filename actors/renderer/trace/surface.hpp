@@ -28,13 +28,73 @@ struct Surface {
   float u = 0;
   float v = 0;
   bool front = true;
+
+  [[nodiscard]] bool has_normal_map() const {
+    return placed->textures.entries[scene::TextureSet::kNormal].image != nullptr && !placed->mesh->tangents.empty();
+  }
 };
+
+namespace detail {
+
+inline constexpr float kOffsetRelative = 4e-6f;  // 34 ulps of the largest coordinate: interpolation and traversal fit
+inline constexpr float kOffsetSmallest = 1e-9f;
+
+[[nodiscard]] inline float largest_size(const glm::vec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+[[nodiscard]] inline glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& otherwise) {
+  const float square = glm::dot(v, v);
+  return square > 1e-30f && square < 1e30f ? v * (1.0f / std::sqrt(square)) : otherwise;
+}
+
+}  // namespace detail
 
 /// Geometry at `point`; indices must be in range. Finite for every non-degenerate triangle.
 [[nodiscard]] Surface make_surface(const RayScene& scene, const SurfacePoint& point);
 [[nodiscard]] inline Surface make_surface(const RayScene& scene, const Hit& hit) {
   return make_surface(scene, SurfacePoint{hit.instance, hit.triangle, hit.u, hit.v, hit.front});
 }
+
+/// The same without a look at the normal map: normal == shading_normal. In the header for the integrators, whose
+/// inner loops it is part of.
+[[nodiscard]] inline Surface make_unbent_surface(const RayScene& scene, const SurfacePoint& point) {
+  Surface s;
+  s.placed = &scene.instance(point.instance);
+  s.instance = point.instance;
+  s.triangle = point.triangle;
+  s.u = point.u;
+  s.v = point.v;
+  s.front = point.front;
+  const auto& placed = *s.placed;
+  const auto& mesh = *placed.mesh;
+  const glm::uvec3 corner = mesh.triangles[point.triangle];
+  const glm::vec3 weights(1.0f - point.u - point.v, point.u, point.v);
+  const glm::vec3 a = placed.positions[corner.x];
+  const glm::vec3 b = placed.positions[corner.y];
+  const glm::vec3 c = placed.positions[corner.z];
+  s.position = a * weights.x + b * weights.y + c * weights.z;
+  s.offset =
+      detail::kOffsetRelative * std::max({detail::largest_size(a), detail::largest_size(b), detail::largest_size(c)}) +
+      detail::kOffsetSmallest;
+  const glm::vec3 cross = glm::cross(b - a, c - a);
+  const float doubled = std::sqrt(glm::dot(cross, cross));
+  s.area = 0.5f * doubled;
+  const float side = point.front ? 1.0f : -1.0f;
+  s.geometric_normal = doubled > 0 ? cross * (side * placed.handedness / doubled) : glm::vec3(0, 0, 1);
+  const glm::vec3 local =
+      mesh.normals[corner.x] * weights.x + mesh.normals[corner.y] * weights.y + mesh.normals[corner.z] * weights.z;
+  s.shading_normal = detail::unit_or(placed.normal_to_world * local * side, s.geometric_normal);
+  // Normals that contradict the face would light it from behind: such a vertex counts as flat.
+  if (glm::dot(s.shading_normal, s.geometric_normal) <= 0) s.shading_normal = s.geometric_normal;
+  s.normal = s.shading_normal;
+  return s;
+}
+
+/// Gives a surface that has_normal_map() the normal that its map holds at the point: `texel`, as it was read there, or
+/// read now.
+void bend_normal(Surface& surface, const glm::vec4& texel);
+void bend_normal(Surface& surface, const scene::Scene& scene);
 
 /// Alpha of the base colour (factor * texture * COLOR_0) at a point of an instance, 0..1.
 [[nodiscard]] float surface_alpha(const scene::Scene& scene, const WorldInstance& placed, std::uint32_t triangle,
