@@ -9,6 +9,7 @@
 #include "actors/atlas/build_layout.hpp"
 #include "actors/atlas/shelf_pack.hpp"
 #include "actors/renderer/exposure.hpp"
+#include "actors/renderer/plan_cost.hpp"
 #include "actors/scene/effect_plan.hpp"
 #include "actors/tile_scheduler/view_report.hpp"
 #include "daemon/commands.hpp"
@@ -24,6 +25,7 @@ struct Inspected {
   std::shared_ptr<const scene::Scene> scene;
   std::shared_ptr<const atlas::Layout> layout;
   std::shared_ptr<const renderer::trace::RayScene> rays;
+  std::shared_ptr<const renderer::LightTransport> transport;
   float exposure = 1;
   double load_seconds = 0;
   atlas::LayoutTimes times;
@@ -47,8 +49,9 @@ Result<Inspected> load(const config::Config& config) {
   auto rays = renderer::trace::RayScene::build(out.scene, threads);
   if (!rays) return std::unexpected(rays.error());
   out.rays = std::move(*rays);
-  out.exposure = config.scene.exposure > 0 ? static_cast<float>(config.scene.exposure)
-                                           : renderer::scene_exposure(renderer::LightTransport(out.scene, out.rays));
+  out.transport = std::make_shared<const renderer::LightTransport>(out.scene, out.rays);
+  out.exposure =
+      config.scene.exposure > 0 ? static_cast<float>(config.scene.exposure) : renderer::scene_exposure(*out.transport);
   return out;
 }
 
@@ -62,7 +65,8 @@ json describe_scene(const Inspected& in) {
                  {"lights", in.scene->lights.size()},
                  {"warnings", in.scene->warnings},
                  {"exposure", in.exposure}};
-  for (const auto& effect : scene::plan_effects(*in.scene).effects) {
+  report["integrator"] = renderer::to_string(in.transport->effects());
+  for (const auto& effect : in.transport->plan().effects) {
     report["effects"].push_back({{"name", effect.name}, {"needed", effect.needed}, {"reason", effect.reason}});
   }
   return report;
@@ -88,6 +92,35 @@ void describe_atlas(const Inspected& in, json& report) {
   }
   report["dropped_triangles"] = dropped;
   report["seconds"] = {{"load", in.load_seconds}, {"parameterise", in.times.parameterise}, {"pack", in.times.pack}};
+}
+
+json to_json(const renderer::SpeedRatio& speed) {
+  return {{"paths_per_second", speed.rate}, {"peer", speed.peer},
+          {"ratio", speed.ratio},           {"quartiles", {speed.low, speed.median, speed.high}},
+          {"paths", speed.paths},           {"different", speed.different}};
+}
+
+/// What the plan saves against an integrator with everything on, and the time of a path with each effect over without.
+Result<void> measure_plan(const InspectCommand& command, const Inspected& in, json& report) {
+  if (!command.measure) return {};
+  renderer::CostView view;
+  view.camera = start_camera(command.config, *in.scene);
+  if (!command.cameras.empty()) {
+    const auto camera = find_camera(command.config, *in.scene, command.cameras.front());
+    if (!camera) return std::unexpected(camera.error());
+    view.camera = *camera;
+  }
+  const unsigned threads = thread_count(command.config);
+  const auto plan = renderer::measure_plan(*in.transport, view, threads);
+  if (!plan) return std::unexpected(plan.error());
+  report["plan"] = {{"over_all_effects", to_json(plan->planned)}, {"over_all_and_filters", to_json(plan->filtered)}};
+  const auto costs = renderer::measure_effects(*in.transport, view, threads);
+  if (!costs) return std::unexpected(costs.error());
+  for (const auto& cost : *costs)
+    for (auto& effect : report["effects"])
+      if (effect["name"] == cost.effect)
+        effect["time_over_without"] = {{"ratio", cost.ratio}, {"quartiles", {cost.low, cost.high}}};
+  return {};
 }
 
 json to_json(const std::string& camera, const tile_scheduler::ViewReport& view) {
@@ -137,11 +170,19 @@ void print(const json& r) {
   }
   std::printf("seconds: load %.2f, parameterise %.2f, pack %.2f\n", r["seconds"]["load"].get<double>(),
               r["seconds"]["parameterise"].get<double>(), r["seconds"]["pack"].get<double>());
-  std::printf("effects:\n");
+  std::printf("effects (the integrator that runs holds: %s):\n", r["integrator"].get<std::string>().c_str());
   for (const auto& effect : r["effects"]) {
-    std::printf("  %-3s %-24s %s\n", effect["needed"].get<bool>() ? "yes" : "no",
+    std::printf("  %-3s %-24s %s", effect["needed"].get<bool>() ? "yes" : "no",
                 effect["name"].get<std::string>().c_str(), effect["reason"].get<std::string>().c_str());
+    if (effect.contains("time_over_without"))
+      std::printf("; a path takes %.2f times what it takes without",
+                  effect["time_over_without"]["ratio"].get<double>());
+    std::printf("\n");
   }
+  if (r.contains("plan"))
+    std::printf("  paths a second over those with everything on: %.2f; with ray filters everywhere too: %.2f\n",
+                r["plan"]["over_all_effects"]["ratio"].get<double>(),
+                r["plan"]["over_all_and_filters"]["ratio"].get<double>());
   if (!r.contains("views")) return;
   std::printf("views (texels read, tiles touched, efficiency; the paper's packing beside):\n");
   for (const auto& view : r["views"]) {
@@ -163,6 +204,7 @@ int run(const InspectCommand& command) {
   if (!in) return failed(in.error());
   auto report = describe_scene(*in);
   describe_atlas(*in, report);
+  if (const auto measured = measure_plan(command, *in, report); !measured) return failed(measured.error());
   if (const auto views = describe_views(command, *in, report); !views) return failed(views.error());
   if (command.json) {
     std::printf("%s\n", report.dump(2).c_str());

@@ -143,6 +143,7 @@ void add_inspect(CLI::App& app, InspectCommand& command, Common& common, std::st
   common.add_to(app, true);
   app.add_option("--camera", command.cameras, "\"px,py,pz tx,ty,tz fovy\" or a name; may be given several times");
   app.add_option("--size", size, "picture size of the camera")->check(kSize);
+  app.add_flag("--measure", command.measure, "measure what each effect costs, on paths of the first camera");
   app.add_flag("--json", command.json, "machine-readable report");
 }
 
@@ -156,6 +157,8 @@ void add_render(CLI::App& app, RenderCommand& command, Common& common, std::stri
       app.add_option("--until-psnr", command.until_psnr, "go on until the reference's own PSNR is this many dB")
           ->check(number(1, 100, false));
   app.add_option("--effects", effects, "full or view-independent")->check(CLI::IsMember({"full", "view-independent"}));
+  app.add_flag("--all-effects", command.all_effects,
+               "compile-time plan off: every effect's code runs; the picture is the same (for comparison)");
   app.add_option("--seed", command.seed, "seed of the sample sequences");
   app.add_option("--out", command.out, "picture (.png); .pfm, .a.pfm, .b.pfm (halves) and .json are written beside it")
       ->required()

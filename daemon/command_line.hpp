@@ -24,6 +24,7 @@ struct InspectCommand {
   std::vector<std::string> cameras;  ///< SPECs; each adds a working-set report
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
+  bool measure = false;  ///< what the effect plan saves and each effect costs, on the first camera's paths
   bool json = false;
 };
 
@@ -36,6 +37,7 @@ struct RenderCommand {
   std::uint32_t spp = 0;  ///< both halves together; 0: until `until_psnr`
   double until_psnr = 0;  ///< the reference's own PSNR, dB; 0: until `spp`
   bool view_independent = false;
+  bool all_effects = false;  ///< the integrator with everything on, whatever the scene's plan is
   std::uint64_t seed = 1;
   std::filesystem::path out;
   bool json = false;

@@ -44,7 +44,9 @@ Result<nlohmann::json> render(const RenderCommand& command) {
   if (!camera) return std::unexpected(camera.error());
   auto rays = renderer::trace::RayScene::build(*scene, threads);
   if (!rays) return std::unexpected(rays.error());
-  const renderer::LightTransport transport(*scene, *rays);
+  renderer::TransportOptions options;
+  options.all_effects = command.all_effects;
+  const renderer::LightTransport transport(*scene, *rays, options);
 
   renderer::ReferenceJob job;
   job.camera = *camera;
@@ -74,7 +76,8 @@ Result<nlohmann::json> render(const RenderCommand& command) {
       {"spp", picture->spp},         {"reference_psnr", picture->own_psnr},
       {"exposure", job.exposure},    {"paths", picture->paths},
       {"seconds", picture->seconds}, {"paths_per_second", rate},
-      {"threads", threads},          {"out", command.out.string()}};
+      {"threads", threads},          {"integrator", renderer::to_string(transport.effects())},
+      {"out", command.out.string()}};
   return report;
 }
 

@@ -93,6 +93,7 @@ int run(const ServeCommand& command) {
   const std::string why = stop.wait(interval, [&] {
     notifier.watchdog();
     daemon->report_store();
+    daemon->report_effects();
   });
   if (stop.failed()) {
     spdlog::error("stopping: {}", why);

@@ -12,6 +12,7 @@
 #include "actors/session/session_actor.hpp"
 #include "actors/session/tcp_listener.hpp"
 #include "actors/session/udp_listener.hpp"
+#include "daemon/effect_metrics.hpp"
 #include "daemon/observe/prometheus_sink.hpp"
 #include "daemon/pipeline.hpp"
 #include "daemon/scene_setup.hpp"
@@ -50,6 +51,7 @@ struct Daemon::Parts {
   atlas::StoreCounters reported;  // what report_store() has seen
   observe::PrometheusSink metrics;
   std::optional<observe::Health> health;
+  std::optional<EffectMetrics> effects;
   World world;
   std::shared_ptr<StreamDirectory::Sessions> sessions = std::make_shared<StreamDirectory::Sessions>();
   std::unique_ptr<runtime::ThreadedSystem> system;
@@ -133,6 +135,7 @@ Result<Addresses> Daemon::start(const std::function<void(const std::string&)>& o
   auto world = build_world(parts.config, threads);
   if (!world) return std::unexpected(world.error());
   parts.world = std::move(*world);
+  parts.effects.emplace(parts.metrics, parts.world.transport->plan());
 
   runtime::ThreadedOptions options;
   options.workers = threads;
@@ -159,6 +162,10 @@ void Daemon::report_store() {
   if (now.torn > parts.reported.torn)
     spdlog::warn("radiance store: {} damaged tiles refused so far; they are lit anew", now.torn);
   parts.reported = now;
+}
+
+void Daemon::report_effects() {
+  if (parts_->effects) parts_->effects->report();
 }
 
 bool Daemon::stop(std::chrono::milliseconds deadline) {

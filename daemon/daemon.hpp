@@ -36,6 +36,8 @@ class Daemon {
   /// Says in the log, once each, what an operator should know of the radiance store: that it is full, that tiles of it
   /// were refused. Call it every second or so.
   void report_store();
+  /// Brings the metrics of the light's effects up to date. Call it every second or so.
+  void report_effects();
 
   /// Refuses new clients, says goodbye, finishes slices, writes the store, joins. Returns false if something was late:
   /// the process should then leave by std::_Exit.
