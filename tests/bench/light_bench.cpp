@@ -14,8 +14,6 @@
 #include <cstdlib>
 #include <random>
 
-#include "actors/renderer/coarse_level.hpp"
-#include "actors/renderer/stored_light.hpp"
 #include "tests/bench/lit_view.hpp"
 
 namespace {
@@ -81,34 +79,6 @@ Tally sample_all(const renderer::TileSurfaces& surfaces, const std::vector<Texel
   });
   for (const double s : seconds) tally.seconds += s;
   return tally;
-}
-
-// The coarse level as the renderer brings it on: rounds 1, 2, 4, ... each reading what the one before left.
-void light_coarse(LitView& view, renderer::TileSurfaces& surfaces, std::uint32_t rounds) {
-  const int level = view.world.layout->coarse_level();
-  const auto tiles = renderer::level_tiles_of(*view.world.layout).back();
-  auto& store = *view.world.store;
-  renderer::TileFactsCache facts(std::size_t{tiles.x} * tiles.y + 16);
-  for (std::uint32_t n = 1; n <= rounds; n *= 2) {
-    atlas::parallel_for(std::size_t{tiles.x} * tiles.y, kThreads, [&](std::size_t i) {
-      const renderer::trace::DenormalsAreZero denormals;
-      const TileId tile(level, static_cast<std::uint32_t>(i));
-      const auto surface = surfaces.tile(tile);
-      (void)renderer::shade_tile(store, tile, TexelMask::all(), n, *surface, n);
-      if (const auto known = facts.get(tile, surfaces, store);
-          known && known->learn_albedo(*surface, TexelMask::all(), 4))
-        if (auto update = store.begin_update(tile)) update->put_albedo(known->albedo_means);
-    });
-    auto light = std::make_shared<renderer::StoredLight>(view.world.layout);
-    atlas::parallel_for(std::size_t{tiles.x} * tiles.y, kThreads, [&](std::size_t i) {
-      const TileId tile(level, static_cast<std::uint32_t>(i));
-      renderer::TileDisplay display(store, facts, {view.world.exposure});
-      (void)display.draw(tile, tiles, TexelMask::all());
-      if (const auto stored = store.read(tile))
-        light->put(tile.index(), renderer::stored_texels(*stored, display.filtered()));
-    });
-    surfaces.use_stored_light(light);
-  }
 }
 
 double shown(double linear) {

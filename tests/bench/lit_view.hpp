@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "actors/atlas/parallel.hpp"
+#include "actors/renderer/coarse_level.hpp"
+#include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/texel_shading.hpp"
 #include "actors/renderer/tile_display.hpp"
 #include "actors/renderer/tile_surface_scene.hpp"
@@ -37,20 +39,14 @@ struct LitView {
 
 using TileMasks = std::unordered_map<TileId, TexelMask>;
 
-/// Loads scene, atlas and store (created in `state_dir` if it is not there); the working set is traced, nothing is lit.
-inline Result<void> open_view(LitView& view, const char* setup, const char* scene, const char* camera,
-                              const char* state_dir, double q) {
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is the figures' alone
-  auto loaded = config::load(std::vector<std::filesystem::path>{setup});
-  if (!loaded) return fail(config::to_string(loaded.error()));
-  view.config = std::move(*loaded);
-  view.config.scene.file = scene;
-  view.config.state.dir = state_dir;
-  view.config.scene.q = q;
+/// Loads scene, atlas and store of `view.config` (created in its state directory if they are not there); the working
+/// set is traced, nothing is lit. Without a camera, the one a client starts with.
+inline Result<void> open_view(LitView& view, const std::string& camera) {
   auto world = build_world(view.config, kThreads);
   if (!world) return std::unexpected(world.error());
   view.world = std::move(*world);
-  const auto found = find_camera(view.config, *view.world.scene, camera);
+  const auto found = camera.empty() ? Result<Camera>(start_camera(view.config, *view.world.scene))
+                                    : find_camera(view.config, *view.world.scene, camera);
   if (!found) return std::unexpected(found.error());
   view.camera = *found;
   for (int pass = 0; pass < tile_scheduler::kAllPasses; ++pass) {
@@ -61,6 +57,18 @@ inline Result<void> open_view(LitView& view, const char* setup, const char* scen
   }
   view.chains = view.set.chains();
   return {};
+}
+
+inline Result<void> open_view(LitView& view, const char* setup, const char* scene, const char* camera,
+                              const char* state_dir, double q) {
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("bench"));  // standard output is the figures' alone
+  auto loaded = config::load(std::vector<std::filesystem::path>{setup});
+  if (!loaded) return fail(config::to_string(loaded.error()));
+  view.config = std::move(*loaded);
+  view.config.scene.file = scene;
+  view.config.state.dir = state_dir;
+  view.config.scene.q = q;
+  return open_view(view, camera);
 }
 
 /// What a daemon lights for this view: sharp texels, those of coarser tiles that may stand in, and borders.
@@ -102,6 +110,34 @@ inline void light(LitView& view, const TileMasks& masks, std::uint32_t samples) 
   });
   for (const auto& s : shaded)
     if (s.image) view.images.put(s);
+}
+
+/// The coarse level as the renderer brings it on: rounds 1, 2, 4, ... each reading what the one before left.
+inline void light_coarse(LitView& view, renderer::TileSurfaces& surfaces, std::uint32_t rounds) {
+  const int level = view.world.layout->coarse_level();
+  const auto tiles = renderer::level_tiles_of(*view.world.layout).back();
+  auto& store = *view.world.store;
+  renderer::TileFactsCache facts(std::size_t{tiles.x} * tiles.y + 16);
+  for (std::uint32_t n = 1; n <= rounds; n *= 2) {
+    atlas::parallel_for(std::size_t{tiles.x} * tiles.y, kThreads, [&](std::size_t i) {
+      const renderer::trace::DenormalsAreZero denormals;
+      const TileId tile(level, static_cast<std::uint32_t>(i));
+      const auto surface = surfaces.tile(tile);
+      (void)renderer::shade_tile(store, tile, TexelMask::all(), n, *surface, n);
+      if (const auto known = facts.get(tile, surfaces, store);
+          known && known->learn_albedo(*surface, TexelMask::all(), 4))
+        if (auto update = store.begin_update(tile)) update->put_albedo(known->albedo_means);
+    });
+    auto light = std::make_shared<renderer::StoredLight>(view.world.layout);
+    atlas::parallel_for(std::size_t{tiles.x} * tiles.y, kThreads, [&](std::size_t i) {
+      const TileId tile(level, static_cast<std::uint32_t>(i));
+      renderer::TileDisplay display(store, facts, {view.world.exposure});
+      (void)display.draw(tile, tiles, TexelMask::all());
+      if (const auto stored = store.read(tile))
+        light->put(tile.index(), renderer::stored_texels(*stored, display.filtered()));
+    });
+    surfaces.use_stored_light(light);
+  }
 }
 
 }  // namespace darm::bench

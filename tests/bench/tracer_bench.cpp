@@ -2,8 +2,6 @@
 // Speed of the tracer on a real scene, beside its limits: rays against a bare Embree loop over the same rays, paths
 // against Blender Cycles 3.4 (0.33 M paths/s on Sponza, 640x360, 32 bounces, two threads).
 // Usage: tracer_bench [SCENE.glb] [THREADS] [SPP]
-#include <embree3/rtcore.h>
-
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -16,6 +14,7 @@
 #include "actors/renderer/reference_renderer.hpp"
 #include "actors/renderer/sampling.hpp"
 #include "actors/scene/gltf_loader.hpp"
+#include "tests/bench/bare_scene.hpp"
 
 namespace {
 
@@ -45,24 +44,8 @@ std::vector<trace::Ray> bounce_rays(const trace::RayScene& rays, const glm::vec3
   return made;
 }
 
-// Embree alone: the same triangles and settings, no filters, no checks, no reading of hits.
 double bare_rays_per_second(const trace::RayScene& rays, const std::vector<trace::Ray>& queries) {
-  RTCDevice device = rtcNewDevice(nullptr);
-  RTCScene scene = rtcNewScene(device);
-  rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-  for (std::uint32_t i = 0; i < rays.instance_count(); ++i) {
-    const auto& placed = rays.instance(i);
-    RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, placed.positions, 0, 12,
-                               placed.mesh->positions.size());
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, placed.mesh->triangles.data(), 0, 12,
-                               placed.mesh->triangles.size());
-    rtcCommitGeometry(g);
-    rtcAttachGeometryByID(scene, g, i);
-    rtcReleaseGeometry(g);
-  }
-  rtcCommitScene(scene);
+  const bench::BareScene bare(rays);
   const auto start = Clock::now();
   unsigned hits = 0;
   for (const auto& r : queries) {
@@ -73,12 +56,10 @@ double bare_rays_per_second(const trace::RayScene& rays, const std::vector<trace
              r.tmax,     ~0u,        0u,         0u};
     q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene, &context, &q);
+    rtcIntersect1(bare.scene(), &context, &q);
     hits += q.hit.geomID != RTC_INVALID_GEOMETRY_ID ? 1u : 0u;
   }
   const double seconds = seconds_since(start);
-  rtcReleaseScene(scene);
-  rtcReleaseDevice(device);
   return hits > 0 ? static_cast<double>(queries.size()) / seconds : 0;
 }
 

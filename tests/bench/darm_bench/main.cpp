@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "tests/bench/darm_bench/effects.hpp"
+#include "tests/bench/darm_bench/raytrace.hpp"
 #include "tests/bench/darm_bench/time_to_quality.hpp"
 
 namespace {
@@ -36,6 +38,24 @@ void declare_time_to_quality(CLI::App& app, darm::bench::TimeToQualityOptions& o
   app.add_option("--q", o.q, "texels per world unit (default: the set-up's)");
 }
 
+void declare_raytrace(CLI::App& app, darm::bench::RaytraceOptions& o) {
+  app.add_option("--scene", o.scene, "glTF file (default: the set-up's)");
+  app.add_option("--config", o.config, "set-up, e.g. config/scenes/sponza.toml");
+  app.add_option("--camera", o.camera, "a camera as darmd takes it (default: where a client starts)");
+  app.add_option("--state-dir", o.state_dir, "keeps layouts; its radiance stores are deleted")
+      ->default_val("bench-state");
+  app.add_option("--tiles", o.tiles, "tiles to shade, of those the camera sees")->capture_default_str();
+  app.add_option("--q", o.q, "texels per world unit (default: the set-up's)");
+  app.add_flag("--all-effects", o.all_effects, "the integrator with everything on");
+}
+
+void declare_effects(CLI::App& app, darm::bench::EffectsOptions& o) {
+  app.add_option("--scene", o.scene, "glTF file (default: the set-up's)");
+  app.add_option("--config", o.config, "set-up, e.g. config/scenes/sponza.toml");
+  app.add_option("--camera", o.camera, "a camera as darmd takes it (default: where a client starts)");
+  app.add_option("--seconds", o.seconds, "processor time of each comparison")->capture_default_str();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -47,6 +67,16 @@ int main(int argc, char** argv) {
   auto* time = app.add_subcommand("time-to-quality", "seconds until a picture is good, beside tracing camera frames");
   declare_time_to_quality(*time, quality);
   time->add_flag("--json", json, "one line of JSON");
+  darm::bench::RaytraceOptions rays;
+  auto* trace = app.add_subcommand("raytrace", "rays a second inside the renderer, beside the ray library alone");
+  declare_raytrace(*trace, rays);
+  trace->add_flag("--json", json, "one line of JSON");
+  darm::bench::EffectsOptions plan;
+  auto* effects = app.add_subcommand("effects", "what the effect plan saves over everything on, and each effect costs");
+  declare_effects(*effects, plan);
+  effects->add_flag("--json", json, "one line of JSON");
   CLI11_PARSE(app, argc, argv);
+  if (effects->parsed()) return print(darm::bench::effects(plan), json);
+  if (trace->parsed()) return print(darm::bench::raytrace(rays), json);
   return print(darm::bench::time_to_quality(quality), json);
 }
