@@ -1,5 +1,7 @@
 #include "actors/session/geometry_stream.hpp"
 
+#include <xxhash.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -107,6 +109,14 @@ void put_surroundings(const scene::Scene& scene, float exposure, wire::SceneMani
   }
 }
 
+// Of all bytes a client is sent before the first picture.
+std::uint64_t tag_of(const GeometryStream& stream) {
+  std::uint64_t tag = XXH3_64bits(stream.manifest()->data(), stream.manifest()->size());
+  for (std::uint32_t c = 0; c < stream.chunk_count(); ++c)
+    tag = XXH3_64bits_withSeed(stream.chunk(c)->data(), stream.chunk(c)->size(), tag);
+  return std::max<std::uint64_t>(tag, 1);
+}
+
 Result<void> check(const scene::Scene& scene, const atlas::Layout& layout, float exposure) {
   if (!(std::isfinite(exposure) && exposure > 0)) return fail("geometry: exposure must be finite and above 0");
   if (layout.instances.size() != scene.instances.size()) {
@@ -198,6 +208,9 @@ Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene:
   m.set_exposure(exposure);
   m.set_name(std::filesystem::path(scene.path).stem().string());
   m.set_triangles(scene.triangle_count());
+  stream->manifest_ = framed(envelope);
+  stream->tag_ = tag_of(*stream);
+  m.set_tag(stream->tag_);
   stream->manifest_ = framed(envelope);
   if (stream->manifest_->size() > proto::kMaxServerEnvelope) return fail("geometry: the manifest is over 512 MiB");
   return std::shared_ptr<const GeometryStream>(std::move(stream));

@@ -22,6 +22,8 @@ class GeometryStream {
                                                                            unsigned threads);
 
   [[nodiscard]] const SharedBytes& manifest() const { return manifest_; }
+  /// SceneManifest.tag: not 0; equal for equal manifest and geometry alone (64 bits of hash).
+  [[nodiscard]] std::uint64_t tag() const { return tag_; }
   [[nodiscard]] std::size_t chunk_count() const { return chunks_.size(); }
   [[nodiscard]] const SharedBytes& chunk(std::uint32_t index) const { return chunks_[index].bytes; }
 
@@ -43,6 +45,7 @@ class GeometryStream {
   };
 
   glm::dvec3 origin_{0.0};
+  std::uint64_t tag_ = 0;
   SharedBytes manifest_;
   std::vector<Chunk> chunks_;
 };

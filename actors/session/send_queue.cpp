@@ -19,13 +19,19 @@ void SendQueue::push_bulk(Packet packet) {
   items_.push_back({Kind::kBulk, std::move(packet), nullptr, {}, 0, 0});
 }
 
+void SendQueue::push_manifest(Packet packet) {
+  ++bulk_waiting_;
+  items_.push_back({Kind::kManifest, std::move(packet), nullptr, {}, 0, 0});
+}
+
 void SendQueue::push_coarse(Packet packet) {
   const auto old = std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kCoarse; });
   if (old != items_.end()) {
     old->packet = std::move(packet);
     return;
   }
-  items_.push_back({Kind::kCoarse, std::move(packet), nullptr, {}, 0, 0});
+  const auto geometry = std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kBulk; });
+  items_.insert(geometry, {Kind::kCoarse, std::move(packet), nullptr, {}, 0, 0});
 }
 
 bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer,
@@ -105,6 +111,7 @@ std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make,
     case Kind::kControl:
       control_waiting_bytes_ -= item.packet.size();
       return std::move(item.packet);
+    case Kind::kManifest:
     case Kind::kBulk:
       --bulk_waiting_;
       return std::move(item.packet);

@@ -29,7 +29,9 @@ class SendQueue {
 
   void push_control(Packet packet);
   void push_bulk(Packet packet);
-  /// Replaces a coarse texture that still waits.
+  /// Bulk that all later bulk and coarse textures need.
+  void push_manifest(Packet packet);
+  /// Replaces a coarse texture that still waits. Overtakes waiting geometry, so that what comes of it can be drawn lit.
   void push_coarse(Packet packet);
   /// False: dropped (and with it whatever pictures waited).
   bool push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer, Microseconds now);
@@ -55,7 +57,7 @@ class SendQueue {
   [[nodiscard]] std::size_t pictures_dropped() const { return pictures_dropped_; }
 
  private:
-  enum class Kind : std::uint8_t { kControl, kBulk, kCoarse, kPicture, kNoChange };
+  enum class Kind : std::uint8_t { kControl, kManifest, kBulk, kCoarse, kPicture, kNoChange };
   struct Item {
     Kind kind;
     Packet packet;  // control, bulk, coarse

@@ -149,9 +149,10 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
     }
   }
   state_ = State::kOpen;
+  const bool scene_known = hello.known_scene() == scene_->tag();
   const float target = target_error(hello);
-  send_welcome(*format, target);
-  send_scene(eye);
+  send_welcome(*format, target, scene_known);
+  if (!scene_known) send_scene(eye);
   actions.push_back(tile_scheduler::SessionOpened(id_, *format, target));
   actions.push_back(encoder::CoarseWanted(id_));
 }
@@ -163,7 +164,7 @@ float SessionProtocol::target_error(const wire::Hello& hello) const {
   return std::clamp(wanted, policy_.least_target_error, 1.0f);
 }
 
-void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, float target_error) {
+void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, float target_error, bool scene_known) {
   wire::Envelope envelope;
   auto* w = envelope.mutable_welcome();
   w->set_version(proto::kProtocolVersion);
@@ -178,11 +179,12 @@ void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, f
   w->set_server(policy_.server);
   w->set_view_phystex(format.view_phystex);
   w->set_target_error(target_error);
+  w->set_scene_known(scene_known);
   send(envelope);
 }
 
 void SessionProtocol::send_scene(const glm::dvec3& eye) {
-  queue_.push_bulk(packet_of(scene_->manifest()));
+  queue_.push_manifest(packet_of(scene_->manifest()));
   for (const auto index : scene_->nearest_first(eye)) queue_.push_bulk(packet_of(scene_->chunk(index)));
 }
 

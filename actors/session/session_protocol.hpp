@@ -88,7 +88,7 @@ class SessionProtocol {
   std::optional<tile_scheduler::StreamFormat> negotiate(const wire::Hello& hello) const;
   [[nodiscard]] float target_error(const wire::Hello& hello) const;
   void send(const wire::Envelope& envelope);
-  void send_welcome(const tile_scheduler::StreamFormat& format, float target_error);
+  void send_welcome(const tile_scheduler::StreamFormat& format, float target_error, bool scene_known);
   void send_scene(const glm::dvec3& eye);
   void ask_for_keys(Microseconds now, Actions& actions);
 

@@ -94,8 +94,28 @@ TEST_F(SessionProtocolTest, a_hello_is_answered_in_the_agreed_order) {
   EXPECT_EQ(out[0].welcome().udp_port(), 777u);
   EXPECT_EQ(out[0].welcome().phystex_size(), 2048u);
   EXPECT_TRUE(out[1].has_manifest());
-  for (std::size_t i = 0; i < scene()->chunk_count(); ++i) EXPECT_TRUE(out[2 + i].has_geometry());
-  EXPECT_TRUE(out.back().has_coarse());
+  EXPECT_TRUE(out[2].has_coarse()) << "overtakes the geometry that waits, so that it can be drawn lit";
+  for (std::size_t i = 0; i < scene()->chunk_count(); ++i) EXPECT_TRUE(out[3 + i].has_geometry());
+}
+
+TEST_F(SessionProtocolTest, a_client_that_has_the_scene_is_not_sent_it_again) {
+  start();
+  (void)say(hello());
+  const auto first = heard();
+  ASSERT_GT(first.size(), 2u);
+  EXPECT_FALSE(first[0].welcome().scene_known());
+  const auto tag = first[1].manifest().tag();
+  EXPECT_NE(tag, 0u);
+  for (const bool same : {true, false}) {
+    start();
+    auto again = hello();
+    again.mutable_hello()->set_known_scene(same ? tag : tag + 1);
+    (void)say(again);
+    const auto out = heard();
+    ASSERT_FALSE(out.empty());
+    EXPECT_EQ(out[0].welcome().scene_known(), same);
+    EXPECT_EQ(out.size(), same ? 1u : first.size());
+  }
 }
 
 TEST_F(SessionProtocolTest, formats_are_what_both_sides_can_do) {
