@@ -131,7 +131,8 @@ void add_serve(CLI::App& app, ServeOptions& options) {
   options.common.add_to(app, false);
   app.add_option("--tcp-port", options.tcp_port, "clients connect here (0: any free port)")->check(kPort);
   app.add_option("--udp-port", options.udp_port, "cameras arrive here (0: any free port)")->check(kPort);
-  app.add_option("--http-port", options.http_port, "reserved for the web client: only 0 (off)")->check(kPort);
+  app.add_option("--http-port", options.http_port, "the web client, HTTP and HTTPS (0: any free port, -1: off)")
+      ->check(CLI::Range(-1, 65535));
   app.add_option("--metrics-port", options.metrics_port, "Prometheus (0: any free port, -1: off)")
       ->check(CLI::Range(-1, 65535));
   app.add_option("--address", options.address, "address to listen on");

@@ -61,7 +61,19 @@ std::string ready_line(const config::Config& config, const Addresses& at) {
   const std::string host = address.find(':') == std::string::npos ? address : "[" + address + "]";
   std::string line = "ready: tcp " + host + ":" + std::to_string(at.tcp) + ", udp port " + std::to_string(at.udp);
   if (!at.metrics_url.empty()) line += ", metrics " + at.metrics_url;
+  const bool everywhere = address == "0.0.0.0" || address == "::";
+  if (at.web != 0) line += ", web http://" + (everywhere ? "localhost" : host) + ":" + std::to_string(at.web) + "/";
+  if (at.web != 0 && !at.tls_fingerprint.empty()) line += " and https on the same port";
   return line;
+}
+
+// What a person needs to compare when the browser says that it does not know the certificate.
+void tell_certificate(const Addresses& at) {
+  if (at.tls_fingerprint.empty()) return;
+  spdlog::info(
+      "tls: the certificate is {}; its SHA-256 fingerprint is {}",
+      at.certificate_is_ours ? "this server's own, so browsers ask before they trust it" : "the configured one",
+      at.tls_fingerprint);
 }
 
 }  // namespace
@@ -87,6 +99,7 @@ int run(const ServeCommand& command) {
   std::printf("darmd %s (%.2f s)\n", line.c_str(),
               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   std::fflush(stdout);
+  tell_certificate(*addresses);
   notifier.ready(line);
 
   const auto interval = notifier.watchdog_interval().value_or(1s);

@@ -11,12 +11,15 @@
 #include "actors/runtime/threaded_system.hpp"
 #include "actors/session/session_actor.hpp"
 #include "actors/session/tcp_listener.hpp"
+#include "actors/session/tls_context.hpp"
 #include "actors/session/udp_listener.hpp"
+#include "actors/session/web_listener.hpp"
 #include "daemon/effect_metrics.hpp"
 #include "daemon/observe/prometheus_sink.hpp"
 #include "daemon/pipeline.hpp"
 #include "daemon/scene_setup.hpp"
 #include "daemon/stream_directory.hpp"
+#include "daemon/web_client.hpp"
 #include "proto/darm.pb.h"
 
 namespace darm {
@@ -61,10 +64,12 @@ struct Daemon::Parts {
   std::optional<Work> io_work;
   std::unique_ptr<session::UdpListener> udp;
   std::unique_ptr<session::TcpListener> tcp;
+  std::unique_ptr<session::WebListener> web;
   std::thread io_thread;
 
   void fill_supervision(const std::function<void(const std::string&)>& on_fatal);
   [[nodiscard]] Result<Addresses> listen();
+  [[nodiscard]] Result<void> listen_to_clients(Addresses& addresses);
 };
 
 Daemon::Daemon(const config::Config& config, std::uint64_t seed) : parts_(std::make_unique<Parts>()) {
@@ -91,6 +96,46 @@ void Daemon::Parts::fill_supervision(const std::function<void(const std::string&
   table.on_escalate([on_fatal](const Failure& failure) { on_fatal(failure.actor + ": " + failure.what); });
 }
 
+// The ports that clients connect to: bare TCP and the web, both with and without TLS.
+Result<void> Daemon::Parts::listen_to_clients(Addresses& addresses) {
+  session::TcpListenerOptions options;
+  options.address = config.listen.address;
+  options.port = static_cast<std::uint16_t>(config.listen.tcp_port);
+  options.max_sessions = config.session.max_sessions;
+  if (config.tls.enabled) {
+    session::TlsFiles files{config.tls.certificate, config.tls.key};
+    addresses.certificate_is_ours = files.certificate.empty();
+    if (addresses.certificate_is_ours) {
+      auto made = session::self_signed_in(config.state.dir / "tls", config.tls.names);
+      if (!made) return std::unexpected(made.error());
+      files = std::move(*made);
+    }
+    auto context = session::make_tls_context(files);
+    if (!context) return std::unexpected(context.error());
+    options.tls = std::move(*context);
+    auto print = session::fingerprint(files.certificate);
+    if (!print) return std::unexpected(print.error());
+    addresses.tls_fingerprint = std::move(*print);
+  }
+  auto opened_tcp = session::TcpListener::open(io, *system, surroundings, options);
+  if (!opened_tcp) return std::unexpected(opened_tcp.error());
+  tcp = std::move(*opened_tcp);
+  addresses.tcp = tcp->port();
+  if (config.listen.http_port < 0) return {};
+  session::WebListenerOptions web_options;
+  web_options.address = config.listen.address;
+  web_options.port = static_cast<std::uint16_t>(config.listen.http_port);
+  web_options.max_sessions = config.session.max_sessions;
+  web_options.origins = config.web.origins;
+  web_options.files = web_client_files();
+  web_options.tls = options.tls;
+  auto opened_web = session::WebListener::open(io, *system, surroundings, std::move(web_options));
+  if (!opened_web) return std::unexpected(opened_web.error());
+  web = std::move(*opened_web);
+  addresses.web = web->port();
+  return {};
+}
+
 Result<Addresses> Daemon::Parts::listen() {
   Addresses addresses;
   addresses.metrics_url = metrics.url();
@@ -108,15 +153,8 @@ Result<Addresses> Daemon::Parts::listen() {
                                                static_cast<std::uint16_t>(config.listen.udp_port));
   if (!opened_udp) return std::unexpected(opened_udp.error());
   udp = std::move(*opened_udp);
-  session::TcpListenerOptions options;
-  options.address = config.listen.address;
-  options.port = static_cast<std::uint16_t>(config.listen.tcp_port);
-  options.max_sessions = config.session.max_sessions;
-  auto opened_tcp = session::TcpListener::open(io, *system, surroundings, options);
-  if (!opened_tcp) return std::unexpected(opened_tcp.error());
-  tcp = std::move(*opened_tcp);
-  addresses.tcp = tcp->port();
   addresses.udp = udp->port();
+  if (auto ok = listen_to_clients(addresses); !ok) return std::unexpected(ok.error());
   io_work.emplace(io.get_executor());
   io_thread = std::thread([this] { io.run(); });
   return addresses;
@@ -173,6 +211,7 @@ bool Daemon::stop(std::chrono::milliseconds deadline) {
   const auto end = std::chrono::steady_clock::now() + deadline;
   if (parts.health) parts.health->set_ready(false);
   if (parts.tcp) parts.tcp->stop();
+  if (parts.web) parts.web->stop();
   parts.sessions->for_each([](SessionId, const auto& ref) {
     ref.tell(session::CloseSession(static_cast<std::uint32_t>(wire::Goodbye::SERVER_STOPS)));
   });
@@ -189,6 +228,7 @@ bool Daemon::stop(std::chrono::milliseconds deadline) {
   }
   parts.io_work.reset();
   parts.tcp.reset();
+  parts.web.reset();
   parts.udp.reset();
   if (parts.io_thread.joinable()) parts.io_thread.join();  // ends when the last socket is closed
   parts.world.store.reset();

@@ -18,7 +18,10 @@ namespace darm {
 struct Addresses {
   std::uint16_t tcp = 0;
   std::uint16_t udp = 0;
-  std::string metrics_url;  ///< empty: off
+  std::string metrics_url;      ///< empty: off
+  std::uint16_t web = 0;        ///< 0: off
+  std::string tls_fingerprint;  ///< SHA-256 of the certificate; empty: no TLS
+  bool certificate_is_ours = false;
 };
 
 /// Composition root. start() once, stop() once, from the same thread.

@@ -6,7 +6,7 @@ set -euo pipefail
 build=(
   ca-certificates ccache cmake g++ git libavcodec-dev libavutil-dev libboost1.81-dev libcli11-dev libdraco-dev
   libegl-dev libegl-mesa0 libegl1 libeigen3-dev libembree-dev libfmt-dev libgl1-mesa-dri libgles-dev libglm-dev
-  libmeshoptimizer-dev libpng-dev libprotobuf-dev libspdlog-dev libstb-dev libtbb-dev libtinygltf-dev
+  libmeshoptimizer-dev libpng-dev libprotobuf-dev libspdlog-dev libssl-dev libstb-dev libtbb-dev libtinygltf-dev
   libtomlplusplus-dev libxxhash-dev ninja-build nlohmann-json3-dev pkg-config prometheus-cpp-dev
   protobuf-compiler python3 zlib1g-dev
 )

@@ -3,9 +3,11 @@
 #include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/dispatch.hpp>
+#include <boost/asio/ssl/error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 #include <chrono>
+#include <type_traits>
 #include <utility>
 
 namespace darm::session {
@@ -20,13 +22,14 @@ constexpr std::size_t kReadBytes = 16 * 1024;
 constexpr int kSendBufferBytes = 256 * 1024;
 constexpr std::chrono::seconds kLinger{1};
 
-class AsioConnection final : public Connection, public std::enable_shared_from_this<AsioConnection> {
+// Stream: tcp::socket or TlsSocket.
+template <class Stream>
+class AsioConnection final : public Connection, public std::enable_shared_from_this<AsioConnection<Stream>> {
  public:
-  explicit AsioConnection(tcp::socket socket)
-      : socket_(std::move(socket)), linger_(socket_.get_executor()), incoming_(kReadBytes) {
-    error_code ignored;  // without them the session works, only not as well
-    socket_.set_option(tcp::no_delay(true), ignored);
-    socket_.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+  /// `keep`: what `stream` needs to live.
+  explicit AsioConnection(Stream stream, std::shared_ptr<void> keep)
+      : keep_(std::move(keep)), stream_(std::move(stream)), linger_(socket().get_executor()), incoming_(kReadBytes) {
+    set_stream_options(socket());
   }
 
   void attach(runtime::Ref<Inbox> owner) override {
@@ -43,16 +46,26 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
   }
 
  private:
+  static constexpr bool kTls = std::is_same_v<Stream, TlsSocket>;
+
+  tcp::socket& socket() {
+    if constexpr (kTls) {
+      return stream_.next_layer();
+    } else {
+      return stream_;
+    }
+  }
+
   template <class F>
   void on_strand(F&& work) {
-    asio::dispatch(socket_.get_executor(),
-                   [self = shared_from_this(), work = std::forward<F>(work)]() mutable { work(*self); });
+    asio::dispatch(socket().get_executor(),
+                   [self = this->shared_from_this(), work = std::forward<F>(work)]() mutable { work(*self); });
   }
 
   void start_read() {
-    if (reading_ || !socket_.is_open()) return;
+    if (reading_ || !socket().is_open()) return;
     reading_ = true;
-    socket_.async_read_some(asio::buffer(incoming_), [self = shared_from_this()](error_code ec, std::size_t n) {
+    stream_.async_read_some(asio::buffer(incoming_), [self = this->shared_from_this()](error_code ec, std::size_t n) {
       self->reading_ = false;
       self->read_done(ec, n);
     });
@@ -69,13 +82,13 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
   }
 
   void start_write(Packet packet) {
-    if (writing_ || closing_ || !socket_.is_open()) return;
+    if (writing_ || closing_ || !socket().is_open()) return;
     writing_ = true;
     outgoing_ = std::move(packet);
     const std::array<asio::const_buffer, 3> pieces{
         asio::buffer(outgoing_.head), outgoing_.body ? asio::buffer(*outgoing_.body) : asio::const_buffer(),
         asio::buffer(outgoing_.tail)};
-    asio::async_write(socket_, pieces, [self = shared_from_this()](error_code ec, std::size_t n) {
+    asio::async_write(stream_, pieces, [self = this->shared_from_this()](error_code ec, std::size_t n) {
       self->writing_ = false;
       self->outgoing_ = {};
       if (ec && !self->closing_) return self->lost(ec);
@@ -88,35 +101,42 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
     if (closing_) return;
     closing_ = true;
     owner_ = {};
-    if (!socket_.is_open()) return;
+    if (!socket().is_open()) return;
     linger_.expires_after(kLinger);
-    linger_.async_wait([self = shared_from_this()](error_code ec) {
+    linger_.async_wait([self = this->shared_from_this()](error_code ec) {
       if (!ec) self->shut();
     });
     if (!writing_) end_sending();
   }
 
   void end_sending() {
-    if (!socket_.is_open()) return;
-    error_code ec;
-    socket_.shutdown(tcp::socket::shutdown_send, ec);
-    if (ec) return shut();
-    start_read();
+    if (!socket().is_open()) return;
+    if constexpr (kTls) {
+      // Says so under TLS and waits for the other side to say it too; `linger_` bounds it.
+      stream_.async_shutdown([self = this->shared_from_this()](error_code) { self->shut(); });
+    } else {
+      error_code ec;
+      socket().shutdown(tcp::socket::shutdown_send, ec);
+      if (ec) return shut();
+      start_read();
+    }
   }
 
   void shut() {
     linger_.cancel();
     error_code ignored;
-    socket_.close(ignored);
+    socket().close(ignored);
   }
 
   void lost(error_code ec) {
-    owner_.tell(SocketClosed(ec == asio::error::eof ? "the client closed it" : ec.message()));
+    const bool ended = ec == asio::error::eof || ec == asio::ssl::error::stream_truncated;
+    owner_.tell(SocketClosed(ended ? "the client closed it" : ec.message()));
     error_code ignored;
-    socket_.close(ignored);
+    socket().close(ignored);
   }
 
-  tcp::socket socket_;
+  std::shared_ptr<void> keep_;
+  Stream stream_;
   asio::steady_timer linger_;
   runtime::Ref<Inbox> owner_;
   Bytes incoming_;
@@ -128,8 +148,18 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
 
 }  // namespace
 
+void set_stream_options(tcp::socket& socket) {
+  error_code ignored;  // without them the session works, only not as well
+  socket.set_option(tcp::no_delay(true), ignored);
+  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+}
+
 std::shared_ptr<Connection> make_connection(tcp::socket socket) {
-  return std::make_shared<AsioConnection>(std::move(socket));
+  return std::make_shared<AsioConnection<tcp::socket>>(std::move(socket), nullptr);
+}
+
+std::shared_ptr<Connection> make_connection(TlsSocket socket, std::shared_ptr<asio::ssl::context> context) {
+  return std::make_shared<AsioConnection<TlsSocket>>(std::move(socket), std::move(context));
 }
 
 }  // namespace darm::session

@@ -1,16 +1,27 @@
-// A TCP socket as a Connection.
+// A TCP socket, bare or under TLS, as a Connection.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <memory>
 
 #include "actors/session/connection.hpp"
 
 namespace darm::session {
 
+using TlsSocket = boost::asio::ssl::stream<boost::asio::ip::tcp::socket>;
+
 /// `socket` must have an executor that runs one handler at a time (a strand). Lives until its last operation is done.
 /// Closing sends what was written, then waits a second at most for the other side to close, so that a last message is
 /// not lost to a reset.
 [[nodiscard]] std::shared_ptr<Connection> make_connection(boost::asio::ip::tcp::socket socket);
+/// The same under TLS, after its handshake. Keeps `context`.
+[[nodiscard]] std::shared_ptr<Connection> make_connection(TlsSocket socket,
+                                                          std::shared_ptr<boost::asio::ssl::context> context);
+
+/// What both listeners ask of a socket: no delay, and a send buffer so small that what cannot be sent waits in our
+/// queue, where it can be dropped.
+void set_stream_options(boost::asio::ip::tcp::socket& socket);
 
 }  // namespace darm::session

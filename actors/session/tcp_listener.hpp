@@ -10,19 +10,23 @@
 
 namespace boost::asio {
 class io_context;
+namespace ssl {
+class context;
 }
+}  // namespace boost::asio
 
 namespace darm::session {
 
 struct TcpListenerOptions {
   std::string address = "0.0.0.0";
-  std::uint16_t port = 0;      ///< 0: the system chooses
-  unsigned max_sessions = 64;  ///< one more hears SERVER_FULL
-  std::size_t mailbox = 256;   ///< of each session
+  std::uint16_t port = 0;                          ///< 0: the system chooses
+  unsigned max_sessions = 64;                      ///< one more hears SERVER_FULL
+  std::size_t mailbox = 256;                       ///< of each session
+  std::shared_ptr<boost::asio::ssl::context> tls;  ///< clients may speak TLS on the same port; null: they may not
+  std::size_t max_pending = 256;                   ///< sockets at a time whose first byte or handshake is awaited (TLS)
 };
 
-/// Runs on the threads of `io`, which belong to the daemon. An accept that fails (no file descriptors left) is tried
-/// again with back-off; a broken socket is opened anew on the same port.
+/// Runs on the threads of `io`, which belong to the daemon.
 class TcpListener {
  public:
   /// `system` must outlive the listener and `io` must be run by somebody. Error: the address cannot be bound.

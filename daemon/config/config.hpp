@@ -110,8 +110,21 @@ struct ListenConfig {
   std::string address = "0.0.0.0";
   int tcp_port = 9010;
   int udp_port = 9010;
-  int http_port = 0;        ///< reserved for the web client: only 0 (off)
+  int http_port = 9080;     ///< the web client, over HTTP and HTTPS; -1: off
   int metrics_port = 9090;  ///< Prometheus; -1: off
+};
+
+/// [web]
+struct WebConfig {
+  std::vector<std::string> origins;  ///< besides this server's own pages: whose may open a stream; "*": everybody's
+};
+
+/// [tls]: of http_port and tcp_port, which speak both with and without.
+struct TlsConfig {
+  bool enabled = true;
+  std::filesystem::path certificate;  ///< PEM; relative to the config file. Empty: one of our own, in state.dir/tls
+  std::filesystem::path key;          ///< PEM, as above
+  std::vector<std::string> names;     ///< of the certificate of our own, besides this machine's
 };
 
 /// [state]
@@ -141,6 +154,8 @@ struct Config {
   StreamConfig stream;
   SessionConfig session;
   ListenConfig listen;
+  WebConfig web;
+  TlsConfig tls;
   StateConfig state;
   LogConfig log;
 };

@@ -122,6 +122,16 @@ void read_work(TableReader& root, Config& config) {
   });
 }
 
+void read_web(TableReader& root, Config& config, const std::filesystem::path& file) {
+  root.table("web", [&](TableReader& reader) { reader.texts("origins", config.web.origins, kMaxListed, 300); });
+  root.table("tls", [&](TableReader& reader) {
+    reader.boolean("enabled", config.tls.enabled);
+    read_path(reader, "certificate", config.tls.certificate, file);
+    read_path(reader, "key", config.tls.key, file);
+    reader.texts("names", config.tls.names, 100, 253);
+  });
+}
+
 void read_service(TableReader& root, Config& config) {
   root.table("session", [&](TableReader& reader) {
     reader.integer("max_sessions", config.session.max_sessions, 1, 100000);
@@ -134,7 +144,7 @@ void read_service(TableReader& root, Config& config) {
     reader.text("address", config.listen.address, 255);
     reader.integer("tcp_port", config.listen.tcp_port, 0, 65535);
     reader.integer("udp_port", config.listen.udp_port, 0, 65535);
-    reader.integer("http_port", config.listen.http_port, 0, 65535);
+    reader.integer("http_port", config.listen.http_port, -1, 65535);
     reader.integer("metrics_port", config.listen.metrics_port, -1, 65535);
   });
   root.table("state", [&](TableReader& reader) {
@@ -154,6 +164,7 @@ void read_root(ReadReport& report, const TomlTable* table, const std::filesystem
   read_picture(root, config, file);
   read_work(root, config);
   read_service(root, config);
+  read_web(root, config, file);
   root.finish();
 }
 
@@ -217,13 +228,16 @@ std::string to_string(std::span<const Fault> faults) {
 std::vector<Fault> check(const Config& config) {
   std::vector<Fault> faults;
   check_names(config.cameras, "cameras", faults);
-  if (config.listen.http_port != 0)
-    faults.push_back({kSum, 0, "listen.http_port",
-                      fmt::format("{}: there is no web client yet, and nothing would listen; leave it 0 (off)",
-                                  config.listen.http_port)});
-  if (config.listen.tcp_port > 0 && config.listen.tcp_port == config.listen.metrics_port)
-    faults.push_back({kSum, 0, "listen.metrics_port",
-                      fmt::format("{} is listen.tcp_port too; ports must differ", config.listen.metrics_port)});
+  const auto differ = [&faults](const char* key, int port, const char* other_key, int other) {
+    if (port > 0 && port == other)
+      faults.push_back({kSum, 0, key, fmt::format("{} is {} too; ports must differ", port, other_key)});
+  };
+  differ("listen.metrics_port", config.listen.metrics_port, "listen.tcp_port", config.listen.tcp_port);
+  differ("listen.http_port", config.listen.http_port, "listen.tcp_port", config.listen.tcp_port);
+  differ("listen.http_port", config.listen.http_port, "listen.metrics_port", config.listen.metrics_port);
+  if (config.tls.certificate.empty() != config.tls.key.empty())
+    faults.push_back({kSum, 0, config.tls.key.empty() ? "tls.key" : "tls.certificate",
+                      "is missing: name both files, or neither for a certificate of our own"});
   if (config.listen.address.empty())
     faults.push_back({kSum, 0, "listen.address", "must not be empty; 0.0.0.0 is every address of this machine"});
   if (config.state.dir.empty()) faults.push_back({kSum, 0, "state.dir", "must not be empty"});

@@ -114,6 +114,22 @@ void TableReader::number_or_auto(std::string_view key, double& out, double low, 
   (void)read_number(*value, key, low, high, out);
 }
 
+void TableReader::texts(std::string_view key, std::vector<std::string>& out, std::size_t most, std::size_t max_length) {
+  const TomlValue* value = ask(key);
+  if (value == nullptr) return;
+  const auto* array = value->array();
+  std::vector<std::string> read;
+  for (std::size_t i = 0; array != nullptr && i < array->size() && i < most; ++i) {
+    const auto* s = std::get_if<std::string>(&(*array)[i].data);
+    if (s != nullptr && s->size() <= max_length && s->find('\0') == std::string::npos) read.push_back(*s);
+  }
+  if (array == nullptr || read.size() != array->size())
+    fault_at(*value, key,
+             fmt::format("{} is not a list of at most {} texts of {} bytes", value->shown(), most, max_length));
+  else
+    out = std::move(read);
+}
+
 void TableReader::text(std::string_view key, std::string& out, std::size_t max_length) {
   const TomlValue* value = ask(key);
   if (value == nullptr) return;

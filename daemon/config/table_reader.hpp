@@ -38,6 +38,8 @@ class TableReader {
   /// The same, or "auto", which sets 0.
   void number_or_auto(std::string_view key, double& out, double low, double high);
   void text(std::string_view key, std::string& out, std::size_t max_length);
+  /// A list of at most `most` texts.
+  void texts(std::string_view key, std::vector<std::string>& out, std::size_t most, std::size_t max_length);
   void choice(std::string_view key, std::string& out, std::initializer_list<std::string_view> allowed);
   void one_of(std::string_view key, std::uint32_t& out, std::initializer_list<std::uint32_t> allowed);
   void vector3(std::string_view key, glm::dvec3& out, double low, double high);

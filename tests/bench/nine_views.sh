@@ -19,7 +19,7 @@ mkdir -p "$out"
 
 serve() {  # scene file state -> sets daemon, port
   "$bin/darmd" serve --config "config/scenes/$1.toml" --scene "$scenes/$2.glb" --q "${Q:-64}" --state-dir "$3" \
-    --tcp-port 0 --udp-port 0 --metrics-port -1 --allow-lossless > "$3/serve.log" 2>&1 &
+    --tcp-port 0 --udp-port 0 --metrics-port -1 --http-port -1 --allow-lossless > "$3/serve.log" 2>&1 &
   daemon=$!
   until grep -q '^darmd ready' "$3/serve.log"; do
     kill -0 "$daemon" || { cat "$3/serve.log" >&2; exit 1; }

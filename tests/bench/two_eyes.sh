@@ -15,7 +15,7 @@ for i in 0 1; do
     --spp "${SPP:-200}" --until-psnr 42 --state-dir "$out/render" --out "$out/reference-$i.png"
 done
 rm -rf "$out/state"
-"$bin/darmd" serve "$@" --state-dir "$out/state" --address 127.0.0.1 --tcp-port 0 --udp-port 0 --metrics-port 0 \
+"$bin/darmd" serve "$@" --state-dir "$out/state" --address 127.0.0.1 --tcp-port 0 --udp-port 0 --metrics-port 0 --http-port -1 \
   > "$out/serve.log" 2>&1 &
 daemon=$!
 trap 'kill "$daemon" 2> /dev/null || true' EXIT

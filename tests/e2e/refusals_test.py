@@ -58,7 +58,7 @@ class Refusals(unittest.TestCase):
             (SERVE + ["--scene", ""], "--scene"),
             (SERVE + ["--config", SET_UP.parent], "is a directory"),
             (SERVE + ["--config", ""], "--config"),
-            (SERVE + ["--http-port", "8080"], "no web client yet"),
+            (SERVE + ["--http-port", "70000"], "--http-port"),
         ])
 
 

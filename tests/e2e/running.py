@@ -22,7 +22,8 @@ class Daemon:
         self.log = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen(
             [BIN / "darmd", "serve", "--config", SET_UP, "--state-dir", state_dir, "--q", "16", "--address",
-             "127.0.0.1", "--tcp-port", "0", "--udp-port", "0", "--metrics-port", "0", "--allow-lossless", *more],
+             "127.0.0.1", "--tcp-port", "0", "--udp-port", "0", "--metrics-port", "0", "--http-port", "0",
+             "--allow-lossless", *more],
             stdout=subprocess.PIPE, stderr=self.log, text=True)
         self.ready = self.process.stdout.readline()
         found = re.search(r"ready: tcp 127\.0\.0\.1:(\d+), udp port (\d+), metrics http://127\.0\.0\.1:(\d+)", self.ready)

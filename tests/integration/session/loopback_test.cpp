@@ -4,11 +4,10 @@
 #include <boost/asio.hpp>
 #include <thread>
 
-#include "actors/runtime/threaded_system.hpp"
 #include "actors/session/tcp_listener.hpp"
 #include "actors/session/udp_listener.hpp"
 #include "proto/limits.hpp"
-#include "tests/unit/session/small_scene.hpp"
+#include "tests/integration/session/session_world.hpp"
 
 namespace darm::session {
 namespace {
@@ -16,24 +15,6 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using asio::ip::udp;
-
-class SchedulerProbe : public runtime::Actor<tile_scheduler::Inbox> {
- public:
-  struct Seen {
-    std::atomic<int> opened{0}, closed{0};
-    std::atomic<std::uint64_t> newest_view{0};
-  };
-  SchedulerProbe(runtime::Context<tile_scheduler::Inbox> context, Seen* seen)
-      : Actor(std::move(context)), seen_(seen) {}
-  void on(tile_scheduler::SessionOpened&&) { ++seen_->opened; }
-  void on(tile_scheduler::SessionClosed&&) { ++seen_->closed; }
-  void on(tile_scheduler::ViewChanged&& m) { seen_->newest_view = m.sequence; }
-  template <class M>
-  void on(M&&) {}
-
- private:
-  Seen* seen_;
-};
 
 // Blocking client; every read gives up after ten seconds.
 class Client {
@@ -64,37 +45,20 @@ class Client {
   proto::FrameReader reader_{proto::kMaxServerEnvelope};
 };
 
-wire::Envelope hello() {
-  wire::Envelope e;
-  e.mutable_hello()->set_version(1);
-  e.mutable_hello()->set_client("loopback");
-  return e;
-}
-
-class LoopbackTest : public ::testing::Test {
+class LoopbackTest : public SessionWorld {
  protected:
   LoopbackTest() {
-    const auto [scene, layout] = testing::grid(100);
-    around->scene = GeometryStream::build(scene, layout, 1.0f, 1).value();
-    around->sessions = std::make_shared<SessionRegistry>();
-    around->scheduler = system.spawn<SchedulerProbe>("tile_scheduler", 64, &seen);
     udp_listener = UdpListener::open(io, around, "127.0.0.1", 0).value();
     TcpListenerOptions options;
     options.address = "127.0.0.1";
     options.max_sessions = 2;
     listener = TcpListener::open(io, system, around, options).value();
-    thread = std::thread([this] { io.run(); });
+    run();
   }
   ~LoopbackTest() override {
     listener->stop();
     udp_listener->stop();
-    system.shutdown(std::chrono::seconds(10));
-    thread.join();  // nothing is left that keeps the context running
-  }
-  template <class F>
-  static bool eventually(F&& holds) {
-    for (int i = 0; i < 1000 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    return holds();
+    finish();
   }
   std::optional<wire::Welcome> join(Client& client) {
     client.say(hello());
@@ -109,13 +73,8 @@ class LoopbackTest : public ::testing::Test {
     return first->welcome();
   }
 
-  SchedulerProbe::Seen seen;
-  asio::io_context io;
-  runtime::ThreadedSystem system;
-  std::shared_ptr<SessionSurroundings> around = std::make_shared<SessionSurroundings>();
   std::unique_ptr<UdpListener> udp_listener;
   std::unique_ptr<TcpListener> listener;
-  std::thread thread;
 };
 
 TEST_F(LoopbackTest, a_client_joins_hears_pictures_and_leaves) {

@@ -78,6 +78,11 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.listen.udp_port, b.listen.udp_port);
   EXPECT_EQ(a.listen.http_port, b.listen.http_port);
   EXPECT_EQ(a.listen.metrics_port, b.listen.metrics_port);
+  EXPECT_EQ(a.web.origins, b.web.origins);
+  EXPECT_EQ(a.tls.enabled, b.tls.enabled);
+  EXPECT_EQ(a.tls.certificate, b.tls.certificate);
+  EXPECT_EQ(a.tls.key, b.tls.key);
+  EXPECT_EQ(a.tls.names, b.tls.names);
   EXPECT_EQ(a.state.dir, b.state.dir);
   EXPECT_EQ(a.state.max_store_bytes, b.state.max_store_bytes);
   EXPECT_EQ(a.log.level, b.log.level);
@@ -236,10 +241,22 @@ TEST(LoadConfig, MissingAndOversizedFilesAreFaults) {
   std::filesystem::remove(big);
 }
 
-TEST(CheckConfig, WhatNothingListensOnIsRefused) {
-  const auto faults = faults_of("[listen]\nhttp_port = 8080\n");
+TEST(CheckConfig, ACertificateComesWithItsKey) {
+  const auto faults = faults_of("[tls]\ncertificate = \"a.pem\"\n");
   ASSERT_EQ(faults.size(), 1u);
-  EXPECT_TRUE(faults[0].find("listen.http_port: 8080: there is no web client yet") != std::string::npos) << faults[0];
+  EXPECT_TRUE(faults[0].find("tls.key: is missing") != std::string::npos) << faults[0];
+  const auto both = parse("[tls]\ncertificate = \"a.pem\"\nkey = \"/b.pem\"\nnames = [\"x.org\"]\n", "dir/a.toml");
+  ASSERT_TRUE(both) << to_string(both.error());
+  EXPECT_EQ(both->tls.certificate, "dir/a.pem");
+  EXPECT_EQ(both->tls.key, "/b.pem");
+  EXPECT_EQ(both->tls.names, std::vector<std::string>{"x.org"});
+}
+
+TEST(CheckConfig, ListsOfTextsHoldTextsOnly) {
+  EXPECT_EQ(faults_of("[web]\norigins = [\"https://a.org\", 3]\n").size(), 1u);
+  EXPECT_EQ(faults_of("[web]\norigins = \"https://a.org\"\n").size(), 1u);
+  EXPECT_EQ(faults_of("[web]\norigins = [\"" + std::string(301, 'a') + "\"]\n").size(), 1u);
+  EXPECT_TRUE(faults_of("[web]\norigins = [\"https://a.org\", \"*\"]\n").empty());
 }
 
 TEST(CheckConfig, KeysThatChangeNothingAreUnknown) {
@@ -249,6 +266,8 @@ TEST(CheckConfig, KeysThatChangeNothingAreUnknown) {
 
 TEST(CheckConfig, PortsAndNamesMustDiffer) {
   EXPECT_EQ(faults_of("[listen]\ntcp_port = 7\nmetrics_port = 7\n").size(), 1u);
+  EXPECT_EQ(faults_of("[listen]\ntcp_port = 7\nhttp_port = 7\n").size(), 1u);
+  EXPECT_EQ(faults_of("[listen]\nhttp_port = 9090\n").size(), 1u) << "metrics are there";
   EXPECT_TRUE(faults_of("[listen]\ntcp_port = 0\nmetrics_port = 0\nhttp_port = 0\n").empty());
   const std::string camera = "[[cameras]]\nname = \"a\"\nposition = [0,0,0]\ntarget = [1,0,0]\n";
   EXPECT_EQ(faults_of(camera + camera).size(), 1u);

@@ -1,0 +1,89 @@
+#include "actors/session/tls_greeting.hpp"
+
+#include <sys/socket.h>
+
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/ssl/stream.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "actors/session/asio_connection.hpp"
+
+namespace darm::session {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+constexpr std::chrono::seconds kGreetingTime{10};
+constexpr std::uint8_t kTlsHandshake = 0x16;
+
+class Greeting : public std::enable_shared_from_this<Greeting> {
+ public:
+  Greeting(tcp::socket socket, std::shared_ptr<asio::ssl::context> tls,
+           std::function<void(std::shared_ptr<Connection>)> ready)
+      : tls_(std::move(tls)),
+        stream_(std::move(socket), *tls_),
+        timer_(lowest().get_executor()),
+        ready_(std::move(ready)) {}
+
+  void begin(PendingSockets& pending) {
+    auto place = pending.enter([weak = weak_from_this()] {
+      if (const auto self = weak.lock()) self->close_soon();
+    });
+    if (!place) return;  // too many at a time: closed with this object
+    place_.emplace(std::move(*place));
+    timer_.expires_after(kGreetingTime);
+    timer_.async_wait([self = shared_from_this()](error_code ec) {
+      if (!ec) self->close();
+    });
+    lowest().async_wait(tcp::socket::wait_read, [self = shared_from_this()](error_code ec) { self->look(ec); });
+  }
+
+ private:
+  tcp::socket& lowest() { return stream_.next_layer(); }
+
+  void close_soon() {
+    asio::dispatch(lowest().get_executor(), [self = shared_from_this()] { self->close(); });
+  }
+  void close() {
+    timer_.cancel();
+    error_code ignored;
+    lowest().close(ignored);
+  }
+
+  void look(error_code ec) {
+    std::uint8_t first = 0;
+    if (ec || !lowest().is_open() || ::recv(lowest().native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1)
+      return close();
+    if (first != kTlsHandshake) return finish(make_connection(std::move(lowest())));
+    stream_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](error_code failed) {
+      if (failed) return self->close();
+      self->finish(make_connection(std::move(self->stream_), self->tls_));
+    });
+  }
+
+  void finish(std::shared_ptr<Connection> connection) {
+    timer_.cancel();
+    place_.reset();
+    ready_(std::move(connection));
+  }
+
+  std::shared_ptr<asio::ssl::context> tls_;
+  TlsSocket stream_;
+  asio::steady_timer timer_;
+  std::function<void(std::shared_ptr<Connection>)> ready_;
+  std::optional<PendingSockets::Place> place_;
+};
+
+}  // namespace
+
+void greet(tcp::socket socket, const std::shared_ptr<asio::ssl::context>& tls, PendingSockets& pending,
+           std::function<void(std::shared_ptr<Connection>)> ready) {
+  std::make_shared<Greeting>(std::move(socket), tls, std::move(ready))->begin(pending);
+}
+
+}  // namespace darm::session
