@@ -10,7 +10,11 @@ build=(
   libtomlplusplus-dev libxxhash-dev ninja-build nlohmann-json3-dev pkg-config prometheus-cpp-dev
   protobuf-compiler python3 zlib1g-dev
 )
-tests=(clang-19 clang-format-19 clang-tidy-19 libclang-rt-19-dev libgmock-dev libgtest-dev)
+tests=(chromium clang-19 clang-format-19 clang-tidy-19 libclang-rt-19-dev libgmock-dev libgtest-dev)
+
+# Debian's npm does not get along with a node from elsewhere: what is there is used.
+command -v node >/dev/null || build+=(nodejs)
+command -v npm >/dev/null || build+=(npm)
 
 packages=("${build[@]}")
 list=false

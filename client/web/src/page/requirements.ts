@@ -1,0 +1,42 @@
+// What a browser must have, and what to tell who has it not: one sentence with the way out.
+
+export interface Sentence {
+  text: string;
+  /** Where the way out is, if it is a place. */
+  link?: {href: string; label: string};
+}
+
+export interface Surroundings {
+  secure: boolean;
+  webCodecs: boolean;
+  webGl2: boolean;
+  /** The page's address. */
+  href: string;
+}
+
+export function httpsOf(href: string): string {
+  const url = new URL(href);
+  url.protocol = 'https:';
+  return url.href;
+}
+
+/** Null: everything is there. */
+export function whatIsMissing(here: Surroundings): Sentence | null {
+  if (!here.webCodecs && !here.secure) {
+    const href = httpsOf(here.href);
+    return {
+      text: 'Browsers decode the picture over a secure connection only: open this page by HTTPS (the browser may ask ' +
+            "whether you trust this server's own certificate).",
+      link: {href, label: new URL(href).host + ' over HTTPS'},
+    };
+  }
+  if (!here.webCodecs) {
+    return {text: 'This browser cannot decode the picture (it has no WebCodecs): please use a current Chrome, Edge, ' +
+                  'Safari or Firefox.'};
+  }
+  if (!here.webGl2) {
+    return {text: 'This browser cannot draw the scene (it has no WebGL 2): please turn on hardware acceleration in its ' +
+                  'settings, or use another browser.'};
+  }
+  return null;
+}

@@ -1,0 +1,406 @@
+// One visit: ties the stream, the renderer, the camera and the page's few buttons together.
+import type {FromWorker, OutReason, ToWorker, Traffic} from '../shared/messages.js';
+import type {Chunk, FrameUpdate, Planes, SceneShape, StreamShape} from '../shared/scene.js';
+import type {View} from './camera.js';
+import {forward, fromPose, right, toPose, up} from './camera.js';
+import {DrawTimer} from './draw_timer.js';
+import type {Gl} from './gl_resources.js';
+import type {InputOwner} from './input.js';
+import {Input} from './input.js';
+import {fromHash, toHash} from './link.js';
+import type {Notices} from './notices.js';
+import {Panel} from './panel.js';
+import {pick} from './pick.js';
+import {FrameGuard} from './quality.js';
+import {Renderer} from './renderer.js';
+import type {Residency} from './residency.js';
+import {ResidencyCounter} from './residency.js';
+import {Rig, minus, plus, scaled} from './rig.js';
+
+const kStillAfterMs = 150;
+const kLinkAfterMs = 400;
+const kPanelEveryMs = 500;
+
+/** For scripts and tests: `window.darm.status()`. */
+export interface Status {
+  firstPictureMs: number | null;
+  bytesToFirstPicture: number | null;
+  framesDrawn: number;
+  streamFrames: number;
+  finest: boolean;
+  joined: boolean;
+  joins: number;
+  mode: string;
+  view: View | null;
+  error: number | null;
+  lagMs: number | null;
+  residency: Residency | null;
+  /** Bytes of messages so far. */
+  received: number;
+}
+
+export class Visit implements InputOwner {
+  rig: Rig;
+  private readonly input: Input;
+  private readonly panel: Panel;
+  private readonly guard = new FrameGuard();
+  private readonly timer: DrawTimer;
+  private counter: ResidencyCounter;
+  private renderer: Renderer | null = null;
+  private scene: SceneShape | null = null;
+  private shape: StreamShape = {size: 0, viewSize: 0};
+  private shapeNew = false;
+  private chunks: Chunk[] = [];
+  private coarse: Planes | null = null;
+  private placedView: boolean;  // by the link or by hand: the server's start does not move it
+  private loop = 0;
+  private dirty = true;
+  private refined = false;
+  private movedAt = -Infinity;
+  private lastTick = 0;
+  private cameraAt = -Infinity;
+  private cameraDirty = true;
+  private cameraEveryMs = 50;
+  private answersUs = 0;
+  private panelAt = 0;
+  private streamBytes: {at: number; bytes: number}[] = [];
+  private traffic: Traffic = {received: 0, stream: 0, decodeMs: 0, framesLost: 0};
+  private residency: Residency | null = null;
+  private status: Status = {firstPictureMs: null, bytesToFirstPicture: null, framesDrawn: 0, streamFrames: 0,
+    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, lagMs: null, residency: null,
+    received: 0};
+  private shownFrame = 0;
+  private linkTimer = 0;
+
+  constructor(private readonly canvas: HTMLCanvasElement, private readonly gl: Gl, private readonly worker: Worker,
+              private readonly notices: Notices, linked: View | null, early: FromWorker[]) {
+    this.placedView = linked !== null;
+    const calm = matchMedia('(prefers-reduced-motion: reduce)');
+    this.rig = new Rig(linked ?? {position: [0, 0, 0], yaw: 0, pitch: 0, fovy: 0.87},
+                       {low: [-1, -1, -1], high: [1, 1, 1]}, !calm.matches);
+    calm.addEventListener('change', () => (this.rig.easing = !calm.matches));
+    this.timer = new DrawTimer(gl);
+    this.counter = new ResidencyCounter(gl);
+    this.input = new Input(canvas, this);
+    const panelButton = document.getElementById('show-panel')!;
+    this.panel = new Panel(document.getElementById('panel')!, panelButton);
+    panelButton.addEventListener('click', () => this.togglePanel());
+    document.getElementById('mode')!.addEventListener('click', () => this.toggleMode());
+    document.getElementById('share')!.addEventListener('click', () => void this.share());
+    window.addEventListener('keydown', (e) => this.key(e));
+    window.addEventListener('resize', () => this.redraw());
+    window.addEventListener('hashchange', () => this.followLink());
+    window.addEventListener('pagehide', () => this.say({type: 'close'}));
+    canvas.addEventListener('webglcontextlost', (e) => {
+      e.preventDefault();
+      this.renderer = null;
+      this.notices.quiet('The graphics driver was reset; the picture comes back by itself.');
+    });
+    canvas.addEventListener('webglcontextrestored', () => this.restore());
+    Object.assign(window, {darm: {status: (): Status => ({...this.status, view: this.rig.view, mode: this.rig.mode,
+      residency: this.residency, received: this.traffic.received})}});
+    for (const message of early) this.take(message);
+    worker.onmessage = (event: MessageEvent<FromWorker>) => this.take(event.data);
+    this.wake();
+  }
+
+  moved(): void {
+    this.movedAt = performance.now();
+    this.placedView = true;
+    this.cameraDirty = true;
+    this.redraw();
+  }
+
+  pickPivot(x: number, y: number): void {
+    if (this.renderer === null || this.scene === null) return;
+    const {view} = this.rig;
+    const half = Math.tan(view.fovy / 2);
+    const height = this.canvas.clientHeight || 1;
+    const nx = ((2 * x - this.canvas.clientWidth) / height) * half;
+    const ny = (1 - (2 * y) / height) * half;
+    const ray = plus(plus(forward(view), scaled(right(view), nx)), scaled(up(view), ny));
+    const unit = scaled(ray, 1 / Math.hypot(...ray));
+    const distance = pick(this.renderer.placed, minus(view.position, this.scene.origin), unit);
+    if (distance !== null) this.rig.pivot = plus(view.position, scaled(unit, distance));
+  }
+
+  private say(message: ToWorker, transfer: Transferable[] = []): void {
+    this.worker.postMessage(message, transfer);
+  }
+
+  // ---- what the stream brings ----------------------------------------------------------------------------------------
+
+  private take(m: FromWorker): void {
+    switch (m.type) {
+      case 'joined': return this.join(m);
+      case 'scene': return this.beginScene(m.scene);
+      case 'chunk':
+        this.chunks.push(m.chunk);
+        this.renderer?.addChunk(m.chunk);
+        return this.redraw();
+      case 'coarse':
+        this.coarse = m.picture;
+        this.renderer?.putCoarse(m.picture);
+        return this.redraw();
+      case 'frame': return this.takeFrame(m.update, m.answersUs, m.error);
+      case 'answer':
+        this.answersUs = Math.max(this.answersUs, m.answersUs);
+        if (m.error >= 0) this.status.error = m.error;
+        return this.noteLag();
+      case 'traffic': return this.noteTraffic(m.traffic);
+      case 'out': return this.out(m.reason, m.text, m.retryMs);
+    }
+  }
+
+  private join(m: Extract<FromWorker, {type: 'joined'}>): void {
+    if (this.status.joins > 0) this.notices.quiet('Connected again.', 3);
+    else this.notices.quiet('');
+    this.notices.calm();
+    ++this.status.joins;
+    this.status.joined = true;
+    this.shapeNew = m.shape.size !== this.shape.size || m.shape.viewSize !== this.shape.viewSize;
+    this.shape = m.shape;
+    this.cameraEveryMs = 1000 / Math.min(60, Math.max(5, 2 * m.updatesPerSecond));
+    if (!this.placedView) this.rig.view = fromPose(m.start);
+    this.answersUs = 0;
+    this.cameraDirty = true;
+    this.redraw();
+    // The same scene with slots of another size: the renderer is made anew, the geometry is here.
+    if (m.sceneKnown && this.shapeNew && this.scene !== null) this.makeRenderer(this.scene);
+  }
+
+  private beginScene(scene: SceneShape): void {
+    this.scene = scene;
+    this.chunks = [];
+    this.coarse = null;
+    document.title = scene.name ? `${scene.name} – DARM` : 'DARM';
+    const {mode, pivot} = this.rig;
+    this.rig.setBounds({low: plus(scene.low, scene.origin), high: plus(scene.high, scene.origin)});
+    if (this.status.joins > 1) Object.assign(this.rig, {mode, pivot});
+    this.showMode();
+    this.makeRenderer(scene);
+  }
+
+  private makeRenderer(scene: SceneShape): void {
+    try {
+      this.renderer = new Renderer(this.gl, scene, this.shape);
+      for (const chunk of this.chunks) this.renderer.addChunk(chunk);
+      if (this.coarse) this.renderer.putCoarse(this.coarse);
+    } catch (error) {
+      const why = error instanceof Error ? error.message : String(error);
+      this.notices.alert({text: `The scene cannot be drawn here: ${why}.`});
+    }
+    this.redraw();
+  }
+
+  private restore(): void {
+    this.timer.forget();
+    this.counter = new ResidencyCounter(this.gl);
+    if (this.scene !== null) this.makeRenderer(this.scene);
+    this.say({type: 'key frames'});
+    this.notices.quiet('');
+  }
+
+  private takeFrame(update: FrameUpdate, answersUs: number, error: number): void {
+    this.renderer?.apply(update);
+    if (update.picture !== null) this.say({type: 'recycle', buffer: update.picture.buffer}, [update.picture.buffer]);
+    if (update.layer === 'shared') this.shownFrame = update.frame;
+    ++this.status.streamFrames;
+    this.answersUs = Math.max(this.answersUs, answersUs);
+    if (error >= 0) this.status.error = error;
+    this.redraw();
+  }
+
+  private noteTraffic(traffic: Traffic): void {
+    this.traffic = traffic;
+    const at = performance.now();
+    this.streamBytes.push({at, bytes: traffic.stream});
+    while (this.streamBytes.length > 2 && at - this.streamBytes[0]!.at > 4000) this.streamBytes.shift();
+    if (this.panel.open) this.wake();
+  }
+
+  private out(reason: OutReason, text: string, retryMs: number): void {
+    this.status.joined = false;
+    if (reason === 'lost') {
+      this.notices.quiet(this.renderer === null ? `${text} Trying again…`
+                                                : 'Connection lost; the picture stays. Trying again…');
+    } else if (reason === 'full') {
+      const again = ` It is tried again in ${Math.round(retryMs / 1000)} s: please wait, or come back later.`;
+      if (this.renderer === null) this.notices.alert({text: text + again});
+      else this.notices.quiet(text + again);
+    } else if (reason === 'version') {
+      this.notices.alert({text: `${text} Please reload the page.`, link: {href: location.href, label: 'Reload'}});
+    } else if (reason === 'decoder') {
+      const out = 'please use another browser';
+      this.notices.alert({text: `This browser's decoder does not take the picture (${text}): ${out}.`});
+    } else {
+      this.notices.alert({text: `${text} Please reload the page.`, link: {href: location.href, label: 'Reload'}});
+    }
+  }
+
+  // ---- drawing -------------------------------------------------------------------------------------------------------
+
+  private redraw(): void {
+    this.dirty = true;
+    this.refined = false;
+    this.wake();
+  }
+
+  private wake(): void {
+    if (this.loop === 0) this.loop = requestAnimationFrame((now) => this.tick(now));
+  }
+
+  private tick(now: number): void {
+    this.loop = 0;
+    const seconds = Math.min(0.1, Math.max(0, (now - this.lastTick) / 1000));
+    this.lastTick = now;
+    if (this.input.advance(seconds > 0.099 ? 0.016 : seconds)) this.moved();
+    const moving = performance.now() - this.movedAt < kStillAfterMs;
+    const done = this.timer.poll();
+    if (done !== null) {
+      this.guard.note(done.quality, done.ms, performance.now());
+      this.noteDrawn();
+    }
+    this.sendCamera();
+    if (this.renderer !== null && !this.timer.busy) this.drawIfDue(moving);
+    this.countIfDue();
+    this.updatePanel(now, moving);
+    if (this.dirty || !this.refined || moving || this.timer.busy || this.cameraDirty || this.counter.busy ||
+        this.input.polls || this.rig.moving) this.wake();
+  }
+
+  private drawIfDue(moving: boolean): void {
+    const renderer = this.renderer!;
+    const {width, height} = this.fitCanvas();
+    const finest = !moving && this.guard.mayRefine(performance.now());
+    const quality = finest ? this.guard.finest : this.guard.moving;
+    if (!this.dirty && (this.refined || quality !== this.guard.finest)) return;
+    // A still view that cannot be refined yet keeps its finest picture rather than fall back to a coarser one.
+    if (!moving && !finest && this.status.finest && this.guard.level > 0) return;
+    this.timer.start(quality);
+    renderer.draw(this.rig.view, width, height, quality);
+    this.timer.end();
+    this.dirty = false;
+    this.refined = quality === this.guard.finest;
+    this.status.finest = this.refined;
+    ++this.status.framesDrawn;
+    this.noteFirst(renderer);
+  }
+
+  private fitCanvas(): {width: number; height: number} {
+    const ratio = window.devicePixelRatio || 1;
+    const width = Math.max(1, Math.min(16384, Math.round(this.canvas.clientWidth * ratio)));
+    const height = Math.max(1, Math.min(16384, Math.round(this.canvas.clientHeight * ratio)));
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+      this.cameraDirty = true;
+      this.dirty = true;
+    }
+    return {width, height};
+  }
+
+  private noteFirst(renderer: Renderer): void {
+    if (this.status.firstPictureMs !== null || !renderer.textures.hasCoarse) return;
+    if (this.chunks.length < (this.scene?.chunkCount ?? Infinity)) return;
+    this.status.firstPictureMs = performance.now();
+    this.status.bytesToFirstPicture = this.traffic.received;
+    performance.mark('darm first picture');
+  }
+
+  private noteDrawn(): void {
+    this.noteLag();
+    if (this.shownFrame > 0 && this.status.joined) {
+      this.say({type: 'shown', frame: this.shownFrame, drawUs: this.timer.lastMs * 1000});
+      this.shownFrame = 0;
+    }
+  }
+
+  private noteLag(): void {
+    if (this.answersUs > 0) this.status.lagMs = performance.timeOrigin + performance.now() - this.answersUs / 1000;
+    this.answersUs = 0;
+  }
+
+  private sendCamera(): void {
+    const now = performance.now();
+    if (!this.cameraDirty || !this.status.joined || now - this.cameraAt < this.cameraEveryMs) return;
+    const {width, height} = this.fitCanvas();
+    this.cameraAt = now;
+    this.cameraDirty = false;
+    this.say({type: 'camera', pose: toPose(this.rig.view, width, height), atUs: (performance.timeOrigin + now) * 1000});
+    clearTimeout(this.linkTimer);
+    if (this.placedView) this.linkTimer = window.setTimeout(() => this.writeLink(), kLinkAfterMs);
+  }
+
+  private countIfDue(): void {
+    const counted = this.counter.take();
+    if (counted !== null) this.residency = counted;
+  }
+
+  private updatePanel(now: number, moving: boolean): void {
+    if (!this.panel.open || now - this.panelAt < kPanelEveryMs) return;
+    this.panelAt = now;
+    if (this.renderer !== null && !this.counter.busy && !this.timer.busy) {
+      const {width, height} = this.fitCanvas();
+      this.counter.start(this.renderer, this.rig.view, width, height);
+    }
+    const first = this.streamBytes[0];
+    const last = this.streamBytes.at(-1);
+    const span = first && last ? last.at - first.at : 0;
+    this.panel.update({
+      framesPerSecond: moving ? this.timer.framesPerSecond : null, drawMs: this.timer.lastMs, level: this.guard.level,
+      bitsPerSecond: span > 0 ? ((last!.bytes - first!.bytes) * 8000) / span : 0, traffic: this.traffic,
+      lagMs: this.status.lagMs, residency: this.residency, error: this.status.error, seconds: now / 1000});
+  }
+
+  // ---- buttons, keys, the link ---------------------------------------------------------------------------------------
+
+  private key(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.metaKey || e.altKey || e.repeat) return;
+    if (e.code === 'KeyP') this.togglePanel();
+    else if (e.code === 'KeyO') this.toggleMode();
+    else if (e.code === 'KeyH') document.body.classList.toggle('bare');
+  }
+
+  private togglePanel(): void {
+    this.panel.show(!this.panel.open);
+    this.panelAt = 0;
+    this.wake();
+  }
+
+  private toggleMode(): void {
+    this.rig.mode = this.rig.mode === 'walk' ? 'orbit' : 'walk';
+    if (this.rig.mode === 'orbit') this.pickPivot(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
+    this.showMode();
+  }
+
+  private showMode(): void {
+    const orbit = this.rig.mode === 'orbit';
+    const button = document.getElementById('mode')!;
+    button.setAttribute('aria-pressed', String(orbit));
+    button.textContent = orbit ? 'Orbit' : 'Walk';
+  }
+
+  private writeLink(): void {
+    history.replaceState(null, '', toHash(this.rig.view));
+  }
+
+  private followLink(): void {
+    const view = fromHash(location.hash);
+    if (view === null) return;
+    this.rig.stop();
+    this.rig.view = view;
+    this.moved();
+  }
+
+  private async share(): Promise<void> {
+    this.writeLink();
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.notices.quiet('The link to this view is copied.', 3);
+    } catch {
+      this.notices.quiet('The link to this view is in the address bar.', 5);
+    }
+  }
+}
+

@@ -1,0 +1,28 @@
+// Sizes both ends of the wire agree on (proto/limits.hpp, client/core/scene_model.hpp). Checked before memory is taken.
+
+export const kProtocolVersion = 1;
+export const kSubprotocol = 'darm.1';
+export const kStreamPath = '/stream';
+
+export const kTileSize = 30;
+export const kSlotSize = 32;
+export const kSlotTexels = kSlotSize * kSlotSize;
+/** Width of every table texture. */
+export const kTableWidth = 2048;
+export const kMaxTableEntries = kTableWidth * 2048;
+export const kMaxLevels = 16;
+export const kAbsent = 65535;
+export const kNoBase = 0xffffffff;
+
+export const kMaxInstances = 1 << 20;
+export const kMaxChunks = 1 << 20;
+export const kMaxChunkVertices = 1 << 22;
+export const kMaxChunkIndices = 1 << 24;
+/** Vertices and indices of all chunks together, bytes. */
+export const kMaxGeometryBytes = 2 ** 31;
+export const kVertexBytes = 24;
+export const kPatchEntryBytes = 12;
+
+/** Largest PhysTex a browser asks for: hardware decoders stop at H.264 level 5.2. */
+export const kMaxPhysTex = 2048;
+export const kMaxViewPhysTex = 1024;
