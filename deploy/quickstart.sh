@@ -32,7 +32,11 @@ fi
 echo "== 3/3 serve"
 mkdir -p state
 cat <<'TEXT'
-The daemon prints a ready line with its addresses once clients can connect; stop it with Ctrl-C. Then, in another terminal:
+The daemon prints a ready line with its addresses once clients can connect; stop it with Ctrl-C. Then walk in:
+
+  http://localhost:9080/   on this machine; from others https://THIS-MACHINE:9080/ (browsers ask about the certificate first)
+
+or, without a browser, in another terminal:
 
   build/release/bin/darm-probe --server 127.0.0.1:9010 --setup config/scenes/default.toml --camera hall --size 1280x720 --seconds 20 --out picture.png
 
