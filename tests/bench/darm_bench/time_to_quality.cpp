@@ -152,6 +152,7 @@ Result<config::Config> load_config(const TimeToQualityOptions& options) {
   loaded->listen.tcp_port = 0;
   loaded->listen.udp_port = 0;
   loaded->listen.metrics_port = -1;
+  loaded->listen.http_port = -1;
   loaded->stream.allow_lossless = options.truth_seconds > 0;
   return *loaded;
 }
