@@ -64,6 +64,7 @@ test('JavaScript is under 250 kB on the wire, and comes once', async (t) => {
 
 test('walking changes the view at the next frame, though the stream lags by half a second', async (t) => {
   const proxy = await lagging(daemon.web, 500);
+  t.after(() => proxy.close());
   const context = await browser.newContext({viewport: {width: 240, height: 135}});
   const {page} = await visit(context, linkOf('hall'), proxy.port);
   await until(page, (s) => s.firstPictureMs !== null && s.streamFrames > 0, 60, 'a picture through the slow line');
@@ -84,16 +85,15 @@ test('walking changes the view at the next frame, though the stream lags by half
   const walking = await picture(page);
   await page.keyboard.up('KeyW');
   const {pressed, frames} = await page.evaluate(() => globalThis.walkLog);
-  const first = frames.find((f) => f.place !== frames[0].place || f.drawn > frames[0].drawn);
-  assert.ok(first, 'the view moved');
-  t.diagnostic(`first changed frame ${(first.at - pressed).toFixed(0)} ms after the key`);
-  assert.ok(first.at - pressed < 250, `${first.at - pressed} ms`);
+  const moved = frames.findIndex((f) => f.place !== frames[0].place || f.drawn > frames[0].drawn);
+  assert.ok(moved > 0, 'the view moved');
+  t.diagnostic(`first changed frame ${(frames[moved].at - pressed).toFixed(0)} ms after the key`);
+  assert.ok(moved <= 2, `at frame ${moved}: it does not wait for the line`);
   assert.ok(new Set(frames.map((f) => f.place)).size > 5, 'and goes on, frame by frame');
   assert.ok(difference(still, walking) > 1, 'what is seen has changed');
   const s = await until(page, (now) => now.lagMs !== null && now.lagMs > 900, 20, 'a lag that the line makes (there and back)');
   t.diagnostic(`shading lag ${s.lagMs.toFixed(0)} ms`);
   await context.close();
-  proxy.close();
 });
 
 test('dragging looks around, a finger too; two fingers walk', async () => {
