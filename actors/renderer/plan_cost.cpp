@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
-#include <cstring>
+#include <cstdint>
 #include <ctime>
 
 #include "actors/scene/without_effect.hpp"
@@ -41,7 +42,10 @@ double trace_slice(const LightTransport& transport, const CostView& view, std::u
   return thread_seconds() - start;
 }
 
-bool same(const glm::vec3& a, const glm::vec3& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+bool same(const glm::vec3& a, const glm::vec3& b) {
+  using Bits = std::array<std::uint32_t, 3>;
+  return std::bit_cast<Bits>(a) == std::bit_cast<Bits>(b);
+}
 
 }  // namespace
 
