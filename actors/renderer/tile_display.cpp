@@ -115,6 +115,7 @@ void TileDisplay::add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm:
 
 void TileDisplay::shade_slot(TileId id, const LevelTiles& level, std::vector<float>& variance, SlotColours& colours) {
   variance.assign(kSlotTexels, 0.0f);
+  if (level.x == 0) return;  // no such level
   const glm::vec2 first(static_cast<float>(id.index() % level.x * kTileSize) - 0.5f,
                         static_cast<float>(id.index() / level.x * kTileSize) - 0.5f);  // centre of slot texel (0, 0)
   for (int y = 0; y < kSlotSize; ++y) {

@@ -71,6 +71,11 @@ TEST_F(TileDisplayTest, unshaded_tile_has_no_picture) {
   EXPECT_FALSE(display.draw(middle_, level_, TexelMask::all()));
 }
 
+TEST_F(TileDisplayTest, a_level_that_is_not_there_has_no_picture) {
+  TileDisplay display(*store_, facts_, {});
+  EXPECT_FALSE(display.draw(middle_, LevelTiles{}, TexelMask::all()));
+}
+
 TEST_F(TileDisplayTest, border_is_the_neighbours_texel_where_it_is_shaded) {
   world_.world.light = [](TileId id, int texel, std::uint32_t) {
     return TexelLight{glm::vec3(static_cast<float>(id.index()) / 10 + static_cast<float>(texel % 30) / 1000), {}};
