@@ -99,7 +99,7 @@ Result<Recording> CameraStudy::record_once(const World& world, const Variant& va
   run.viewport = options_.viewport;
   run.seconds = variant.seconds;
   run.private_layer = variant.private_layer;
-  run.folder = options_.out / "run";
+  run.folder = options_.out / ".darmd-accuracy-run";
   run.stopped = options_.stopped;
   run.progress = [this, &variant](double now) {
     options_.progress(now, of_seconds(options_.name + ": " + variant.name, now, variant.seconds));

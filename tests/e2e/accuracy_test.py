@@ -69,7 +69,7 @@ class Accuracy(unittest.TestCase):
         with open(self.out / "curves.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(len(rows), sum(len(m["curve"]) for m in report["measurements"]))
-        self.assertFalse((self.out / "run").exists())  # radiance stores are gone
+        self.assertFalse((self.out / ".darmd-accuracy-run").exists())  # radiance stores are gone
         self.assertFalse((self.out / "frames.bin").exists())
 
     def test_a_changed_set_up_is_measured_anew(self):
@@ -89,7 +89,7 @@ class Accuracy(unittest.TestCase):
         _, said = running.communicate(timeout=30)
         self.assertEqual(running.returncode, 130, said)
         self.assertIn("goes on where it stopped", said)
-        self.assertFalse((self.out / "run").exists())
+        self.assertFalse((self.out / ".darmd-accuracy-run").exists())
         done = len(results.read_text().splitlines())
         self.assertLess(done, 3)
         _, said = self.study("--only", "sky,balanced,filter")
