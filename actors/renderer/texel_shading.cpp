@@ -4,6 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "actors/renderer/sampling.hpp"
+
 namespace darm::renderer {
 
 using atlas::Layer;
@@ -34,12 +36,10 @@ struct Goal {
   std::uint32_t soft = 0;
 };
 
-float luminance_of(const glm::vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
-
 bool sharp_varies(const atlas::TileView& view, int texel) {
   const float n = view.count(Layer::kSharp, texel);
   if (n < 2) return true;
-  const float light = luminance_of(view.mean(Layer::kSharp, texel) + view.mean(Layer::kSoft, texel));
+  const float light = luminance(view.mean(Layer::kSharp, texel) + view.mean(Layer::kSoft, texel));
   return view.variance_of_mean(Layer::kSharp, texel, 0) * n > kSettled * kSettled * light * light;
 }
 
