@@ -240,7 +240,10 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
   if (facts && !job.coarse) facts->learn_coverage(job.tile, level, *shared.parts.surfaces);
   const float least = result.shading.progress.least;
   if (!facts || result.shading.progress.mean <= 0) return;
-  if (!facts->learn_albedo(*surface, job.mask, least < 1 ? 2 : least < 2 ? 4 : least < 16 ? 16 : 32)) return;
+  TexelMask wanted = job.mask;
+  // Emission is not stored: what was lit before a restart has to be learned for all that is lit, not for this view.
+  if (job.passes == 0 && surface->emits()) wanted |= lit_texels(*shared.parts.store, job.tile);
+  if (!facts->learn_albedo(*surface, wanted, least < 1 ? 2 : least < 2 ? 4 : least < 16 ? 16 : 32)) return;
   if (auto update = shared.parts.store->begin_update(job.tile)) update->put_albedo(facts->albedo_means);
 }
 

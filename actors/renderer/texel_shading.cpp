@@ -73,6 +73,14 @@ TileProgress survey_tile(const atlas::RadianceStore& store, TileId tile, const T
   return progress_of(mask, surface, store.read(tile));
 }
 
+TexelMask lit_texels(const atlas::RadianceStore& store, TileId tile) {
+  TexelMask lit;
+  const auto view = store.read(tile);
+  for (int t = 0; view && t < kTileTexels; ++t)
+    if (view->count(Layer::kSharp, t) > 0 || view->count(Layer::kSoft, t) > 0) lit.set(t % kTileSize, t / kTileSize);
+  return lit;
+}
+
 Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask, std::uint32_t passes,
                                  const TileSurface& surface, std::uint32_t most) {
   ShadingResult result;

@@ -29,6 +29,9 @@ struct ShadingResult {
 [[nodiscard]] TileProgress survey_tile(const atlas::RadianceStore& store, TileId tile, const TexelMask& mask,
                                        const TileSurface& surface);
 
+/// The texels that have a sample of any light. Reads the store.
+[[nodiscard]] TexelMask lit_texels(const atlas::RadianceStore& store, TileId tile);
+
 /// Where texels of `mask` were never looked at, a first pass: sharp light for each of them, soft light for one texel in
 /// four (and for those whose 2x2 block has none of their patch), which the display spreads. Else up to `passes` samples
 /// of soft light for each texel; texels that are ahead of the least one by more than that wait, so that newly seen

@@ -126,6 +126,8 @@ void TileSchedule::shaded(TileId tile, const TileProgress& progress, std::uint32
   State& s = it->second;
   const bool first_light = s.progress.mean <= 0 && progress.mean > 0;
   if (samples > 0 && (!s.surveyed || s.progress.unshaded > 0)) s.fresh_texels = true;
+  // Texels that somebody else had shaded: their light is there, the picture was drawn without knowing their albedo.
+  if (s.pictured_mean >= 0 && !s.recalled && !s.shown.contains(s.mask)) s.fresh_texels = true;
   s.progress = progress;
   s.surveyed = true;
   s.stored = s.stored || samples > 0;
@@ -172,6 +174,8 @@ void TileSchedule::pictured(TileId tile, float error) {
   State& s = it->second;
   s.pictured_mean = s.progress.mean;
   s.error = error;
+  s.shown |= s.mask;
+  s.recalled = false;
   s.fresh_texels = false;
   s.stale_border = false;
 }
@@ -192,6 +196,7 @@ void TileSchedule::recalled(TileId tile, float error, float samples) {
   if (it == tiles_.end()) return;
   it->second.pictured_mean = samples;
   it->second.error = error;
+  it->second.recalled = true;
 }
 
 void TileSchedule::forget_picture(TileId tile) {

@@ -48,8 +48,8 @@ class TileSchedule {
   /// The job failed: true if the tile may try once more, false if it is quarantined now.
   bool failed(TileId tile);
 
-  /// Tiles whose picture is due: their first, texels seen for the first time, samples grown by publish_growth, the end
-  /// of their work; and, when no first pass waits, those whose neighbour got its first light.
+  /// Tiles whose picture is due: their first, texels that no picture was drawn for, samples grown by publish_growth,
+  /// the end of their work; and, when no first pass waits, those whose neighbour got its first light.
   [[nodiscard]] std::vector<TileId> pictures_due() const;
   void pictured(TileId tile, float error);
 
@@ -64,13 +64,15 @@ class TileSchedule {
  private:
   struct State {
     TexelMask mask;
+    TexelMask shown;  // what the pictures sent so far were drawn for
     float weight = 0;
     bool display = true;
     float target_error = 0;
     bool surveyed = false;
     bool asked_store = false;  // for its picture
     bool stored = false;
-    bool fresh_texels = false;  // some were shaded for the first time since the last picture
+    bool fresh_texels = false;  // some have light that no picture has shown
+    bool recalled = false;      // the last picture came from the store: what it was drawn for is not known
     bool stale_border = false;
     bool quarantined = false;
     int failures = 0;

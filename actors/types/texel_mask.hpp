@@ -27,6 +27,11 @@ class TexelMask {
     for (std::size_t i = 0; i < words_.size(); ++i) words_[i] |= other.words_[i];
     return *this;
   }
+  [[nodiscard]] constexpr bool contains(const TexelMask& other) const {
+    for (std::size_t i = 0; i < words_.size(); ++i)
+      if ((other.words_[i] & ~words_[i]) != 0) return false;
+    return true;
+  }
   [[nodiscard]] constexpr int count() const {
     int n = 0;
     for (const auto w : words_) n += std::popcount(w);

@@ -263,6 +263,25 @@ TEST_F(TileScheduleTest, a_recalled_picture_is_drawn_anew_only_when_samples_have
   EXPECT_EQ(schedule.pictures_due(), std::vector<TileId>{TileId(0, 1)});
 }
 
+TEST_F(TileScheduleTest, a_view_that_grows_over_lit_texels_gets_a_picture_drawn_for_them_once) {
+  TexelMask part;
+  part.set(3, 3);
+  TileRequest seen = request(1, 0.5f);
+  seen.mask = part;
+  schedule.replace({seen}, all_stored);
+  schedule.shaded(TileId(0, 1), at(8), 0);
+  schedule.pictured(TileId(0, 1), 0.1f);
+  EXPECT_TRUE(schedule.pictures_due().empty());
+  schedule.replace({request(1, 0.5f)}, all_stored);  // another texel, which somebody else had lit
+  schedule.shaded(TileId(0, 1), at(8), 0);           // surveyed
+  EXPECT_EQ(schedule.pictures_due(), std::vector<TileId>{TileId(0, 1)});
+  schedule.pictured(TileId(0, 1), 0.1f);
+  schedule.replace({seen}, all_stored);
+  schedule.replace({request(1, 0.5f)}, all_stored);  // back and forth: that was shown
+  schedule.shaded(TileId(0, 1), at(8), 0);
+  EXPECT_TRUE(schedule.pictures_due().empty());
+}
+
 TEST(CoarseRounds, resume_after_the_rounds_that_are_stored) {
   CoarseRounds rounds(1, {3, 3}, 64);
   rounds.resume(16);

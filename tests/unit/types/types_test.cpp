@@ -90,6 +90,9 @@ TEST(TexelMaskTest, SetsCountsAndJoins) {
   EXPECT_EQ(a.count(), 3);
   EXPECT_TRUE(a.test(3, 4));
   EXPECT_EQ(TexelMask::all().count(), kTileTexels);
+  EXPECT_TRUE(TexelMask::all().contains(a));
+  EXPECT_FALSE(a.contains(TexelMask::all()));
+  EXPECT_TRUE(a.contains(a));
 }
 
 TEST(ErrorTest, ContextComesFirst) {
