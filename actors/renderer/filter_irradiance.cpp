@@ -4,189 +4,154 @@
 #include <cmath>
 #include <numbers>
 
-#include "actors/types/tile_id.hpp"
-
 namespace darm::renderer {
 
 namespace {
 
-constexpr int kCounts = 512;  // weights are tabled up to here; more samples want no filter
-constexpr int kStride = kMaxFilterRadius + 1;
 constexpr float kLeastWeight = 0.02f;
 constexpr std::uint32_t kNone = 0xffffffffu;  // texel of no patch
-constexpr float kUnknownVariance = 1e30f;
-constexpr float kLeastSum = 1e-6f;  // of weights times counts: its square is divided by
-constexpr int kMaxPoolRadius = 5;
-constexpr double kPooledSamples = 32;
 
-// A 2D Gaussian averages over 4 pi sigma^2 texels, so sigma^2 = target / (4 pi n).
-float gaussian(float distance, float count, float target) {
-  return std::exp(-distance * distance * 2.0f * std::numbers::pi_v<float> * count / target);
-}
-
-// 1 when alike within the noise, 1/2 at 2.5 standard errors, falling with the fourth power.
-float likeness(float difference, float variance) {
-  const float x = difference * difference / (6.25f * variance + 1e-30f);
-  return 1.0f / (1.0f + x * x);
+// A 2D Gaussian averages over 4 pi sigma^2 texels.
+float gaussian(float distance, float area) {
+  return std::exp(-distance * distance * 2.0f * std::numbers::pi_v<float> / area);
 }
 
 }  // namespace
 
-void FilterWindow::reset(int new_radius) {
-  radius = std::clamp(new_radius, 0, kMaxFilterRadius);
-  size = kSlotSize + 2 * radius;
-  const auto n = static_cast<std::size_t>(size * size);
-  patch.assign(n, 0xffffffffu);
-  for (auto* plane : {&count, &grey, &grey_m2}) plane->assign(n, 0.0f);
-  for (auto& plane : irradiance) plane.assign(n, 0.0f);
-}
-
-int filter_radius(float count, float target) {
-  if (!(count > 0) || count >= target) return 0;
-  int radius = 0;
-  while (radius < kMaxFilterRadius && gaussian(static_cast<float>(radius + 1), count, target) >= kLeastWeight) ++radius;
-  return radius;
-}
-
-void IrradianceFilter::prepare_weights(float target) {
-  if (weights_target_ == target) return;
-  weights_target_ = target;
-  weights_.assign(static_cast<std::size_t>(kCounts * kStride), 0.0f);
-  for (int n = 1; n < kCounts; ++n) {
-    const int radius = filter_radius(static_cast<float>(n), target);
-    for (int d = 0; d <= radius; ++d)
-      weights_[static_cast<std::size_t>(n * kStride + d)] =
-          gaussian(static_cast<float>(d), static_cast<float>(n), target);
+IrradianceFilter::IrradianceFilter() {
+  for (std::size_t c = 1; c < kAreaClasses; ++c) {
+    const float area = area_of_class(static_cast<int>(c));
+    if (gaussian(1, area) < kLeastWeight) continue;
+    firsts_[c] = gaussian(1, area);
+    while (reaches_[c] < kMaxFilterRadius && gaussian(static_cast<float>(reaches_[c] + 1), area) >= kLeastWeight)
+      ++reaches_[c];
   }
 }
 
-// How far to pool around a texel so that what it is compared by is not noise itself: about kPooledSamples samples.
-int IrradianceFilter::pool_radius(const FilterWindow& w) {
-  double samples = 0;
-  double texels = 0;
-  for (std::size_t i = 0; i < w.count.size(); ++i) {
-    samples += double{w.count[i]};
-    texels += w.patch[i] != kNone ? 1.0 : 0.0;
-  }
-  const double each = texels > 0 ? samples / texels : 0.0;
-  int radius = 1;
-  while (radius < kMaxPoolRadius && (2 * radius + 1) * (2 * radius + 1) * each < kPooledSamples) ++radius;
-  return radius;
+FitCentres IrradianceFilter::centres_at(const FilterWindow& w, std::size_t first) const {
+  return {load(&w.patch[first]), load(&statistics_.mean()[first]), load(&statistics_.variance()[first]),
+          load(&first_[first])};
 }
 
-// Mean and variance of all samples of the same patch around each texel: Chan's formula over texels, which also gives a
-// spread where each texel has but one sample. Rows first, then columns of rows: a square, but for patches that wind.
-void IrradianceFilter::pool(const FilterWindow& w) {
-  const auto n = w.count.size();
-  const int radius = pool_radius(w);
-  double weight = 0;
-  double total = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    weight += double{w.count[i]};
-    total += double{w.count[i]} * double{w.grey[i]};
-  }
-  const float pivot = weight > 0 ? static_cast<float>(total / weight) : 0.0f;  // sums of differences: no cancellation
-  pool_rows_.assign(n, PoolSum{});
-  const auto reach = [&](int at, const auto& visit) {
-    for (int d = -std::min(radius, at); d <= std::min(radius, w.size - 1 - at); ++d) visit(d);
-  };
-  for (int y = 0; y < w.size; ++y)
-    for (int x = 0; x < w.size; ++x) {
+// Of the kLanes texels from `first` on.
+int IrradianceFilter::reach_of(std::size_t first) const {
+  const auto* classes = &statistics_.area_class()[first];
+  return reaches_[*std::max_element(classes, classes + kLanes)];
+}
+
+void IrradianceFilter::prepare(const FilterWindow& w) {
+  const std::size_t n = w.count.size();
+  variance_.resize(n);
+  first_.resize(n);
+  const auto& spread = statistics_.spread();
+  for (std::size_t i = 0; i < n; ++i) variance_[i] = spread[i] / std::max(w.count[i], 1.0f);
+  for (std::size_t i = 0; i < n; ++i) first_[i] = firsts_[statistics_.area_class()[i]];
+}
+
+// Most of a tile is often seen by nobody: what has no samples is passed over, kLanes texels at a time.
+void IrradianceFilter::find_lit(const FilterWindow& w) {
+  lit_.assign(w.count.size(), 0);
+  for (int y = 0; y < w.size; ++y) {
+    int dark = kLanes;  // texels without samples from here on
+    for (int x = w.size - 1; x >= 0; --x) {
       const auto at = static_cast<std::size_t>(y * w.size + x);
-      if (w.patch[at] == kNone) continue;
-      PoolSum& sum = pool_rows_[at];
-      reach(x, [&](int d) {
-        const auto other = at + static_cast<std::size_t>(d);
-        if (w.patch[other] != w.patch[at]) return;
-        const float difference = w.grey[other] - pivot;
-        sum.samples += w.count[other];
-        sum.sum += w.count[other] * difference;
-        sum.squares += w.count[other] * difference * difference + w.grey_m2[other];
-      });
+      dark = w.count[at] > 0 ? 0 : dark + 1;
+      lit_[at] = dark < kLanes ? 1 : 0;
     }
-  pooled_.assign(n, 0.0f);
-  pooled_variance_.assign(n, kUnknownVariance);  // like everything
-  texel_variance_.assign(n, 0.0f);
+  }
+}
+
+void IrradianceFilter::filter_rows(const FilterWindow& w) {
+  rows_.resize(static_cast<std::size_t>(w.size * kBlocks));
+  filled_.assign(rows_.size(), 0);
   for (int y = 0; y < w.size; ++y)
-    for (int x = 0; x < w.size; ++x) {
-      const auto at = static_cast<std::size_t>(y * w.size + x);
-      if (w.patch[at] == kNone) continue;
-      PoolSum all;
-      reach(y, [&](int d) {
-        const auto other = static_cast<std::size_t>((y + d) * w.size + x);
-        if (w.patch[other] != w.patch[at]) return;
-        all.samples += pool_rows_[other].samples;
-        all.sum += pool_rows_[other].sum;
-        all.squares += pool_rows_[other].squares;
-      });
-      if (all.samples <= 0) continue;
-      const float mean = all.sum / all.samples;
-      const float m2 = std::max(0.0f, all.squares - mean * all.sum);
-      // A single sample says nothing of its spread: take it as large as the value itself.
-      const float spread = all.samples > 1.5f ? m2 / (all.samples - 1.0f) : (pivot + mean) * (pivot + mean);
-      pooled_[at] = pivot + mean;
-      pooled_variance_[at] = spread / all.samples;
-      texel_variance_[at] = w.count[at] > 0 ? spread / w.count[at] : 0.0f;
+    for (int b = 0; b < kBlocks; ++b) {
+      const auto first = static_cast<std::size_t>(y * w.size + w.radius + b * kLanes);
+      const int reach = std::min(reach_of(first), w.radius);
+      LineFits fits(centres_at(w, first), with_slope_);
+      bool any = false;
+      const auto add = [&](int distance) {
+        const std::size_t q = first + static_cast<std::size_t>(distance);
+        if (lit_[q] == 0) return;
+        any = true;
+        fits.add({load(&w.patch[q]),
+                  load(&statistics_.mean()[q]),
+                  load(&statistics_.variance()[q]),
+                  load(&w.count[q]),
+                  {load(&w.irradiance[0][q]), load(&w.irradiance[1][q]), load(&w.irradiance[2][q])},
+                  load(&variance_[q])},
+                 static_cast<float>(distance));
+      };
+      add(0);
+      for (int d = 1; d <= reach; ++d) {
+        fits.step();
+        add(d);
+        add(-d);
+      }
+      if (!any) continue;
+      filled_[static_cast<std::size_t>(y * kBlocks + b)] = 1;
+      fits.solve(&w.count[first], block(y, b));
     }
+}
+
+void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<FilteredTexel>& out) {
+  Fitted fitted;
+  for (int y = 0; y < kSlotSize; ++y)
+    for (int b = 0; b < kBlocks; ++b) {
+      const auto first = static_cast<std::size_t>((y + w.radius) * w.size + w.radius + b * kLanes);
+      const int reach = std::min(reach_of(first), w.radius);
+      LineFits fits(centres_at(w, first), with_slope_);
+      bool any = false;
+      const auto add = [&](int distance) {
+        const int v = y + w.radius + distance;
+        if (filled_[static_cast<std::size_t>(v * kBlocks + b)] == 0) return;
+        any = true;
+        const auto q = static_cast<std::size_t>(v * w.size + w.radius + b * kLanes);
+        const Fitted& row = block(v, b);
+        fits.add({load(&w.patch[q]), load(&statistics_.mean()[q]), load(&statistics_.variance()[q]), row.weight,
+                  row.value, row.noise},
+                 static_cast<float>(distance));
+      };
+      add(0);
+      for (int d = 1; d <= reach; ++d) {
+        fits.step();
+        add(d);
+        add(-d);
+      }
+      if (!any) continue;
+      fits.solve(&w.count[first], fitted);
+      for (std::size_t x = 0; x < kLanes; ++x) {
+        if (w.patch[first + x] == kNone || fitted.weight[x] < kLeastFitWeight) continue;
+        auto& texel = out[static_cast<std::size_t>(y * kSlotSize + b * kLanes) + x];
+        texel = {{fitted.value[0][x], fitted.value[1][x], fitted.value[2][x]}, fitted.noise[x], 0, true};
+        texel.smear = smear_of(first + x, texel, fitted.weight[x]) + w.held_down * w.held_down;
+        texel.variance *= statistics_.evenness();
+      }
+    }
+}
+
+// Both means hold the texels around this one, the filtered with its largest share of a sample, 1 / weight, in each: the
+// covariance. Variances are those of the filter, but for the spread of a sample.
+float IrradianceFilter::smear_of(std::size_t at, const FilteredTexel& texel, float weight) const {
+  const float spread = statistics_.spread()[at];
+  if (!(spread > 0)) return 0;
+  const auto& c = texel.irradiance;
+  const float difference = 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2] - statistics_.mean()[at];
+  const float narrow = statistics_.variance()[at];
+  const float covariance = std::min(spread / weight, std::sqrt(narrow * texel.variance));
+  const float noise = texel.variance + narrow - 2 * covariance;
+  return difference * difference - noise * statistics_.evenness() * (statistics_.inside()[at] / spread);
 }
 
 void IrradianceFilter::run(const FilterWindow& w, float target, std::vector<FilteredTexel>& out) {
-  prepare_weights(target);
-  pool(w);
-  const int r = w.radius;
-  rows_.assign(static_cast<std::size_t>(w.size * kSlotSize), Row{});
-  const auto weights_of = [&](std::size_t at) {
-    const auto n = std::min(static_cast<int>(w.count[at]), kCounts - 1);
-    return &weights_[static_cast<std::size_t>(std::max(n, 1) * kStride)];
-  };
-
-  for (int y = 0; y < w.size; ++y)
-    for (int x = 0; x < kSlotSize; ++x) {
-      const auto at = static_cast<std::size_t>(y * w.size + x + r);
-      if (w.patch[at] == kNone) continue;
-      const float* table = weights_of(at);
-      Row& row = rows_[static_cast<std::size_t>(y * kSlotSize + x)];
-      for (int d = -r; d <= r; ++d) {
-        const float g = d == 0 ? 1.0f : table[std::abs(d)];
-        const auto q = at + static_cast<std::size_t>(d);
-        if (g == 0 || w.count[q] <= 0 || w.patch[q] != w.patch[at]) continue;
-        const float k =
-            d == 0 ? 1.0f : g * likeness(pooled_[q] - pooled_[at], pooled_variance_[q] + pooled_variance_[at]);
-        const float kn = k * w.count[q];
-        for (std::size_t c = 0; c < 3; ++c) row.irradiance[c] += kn * w.irradiance[c][q];
-        row.weight += kn;
-        row.variance += kn * kn * texel_variance_[q];
-      }
-      if (row.weight < kLeastSum) continue;
-      for (float& channel : row.irradiance) channel /= row.weight;
-      row.variance /= row.weight * row.weight;
-    }
-
   out.assign(kSlotTexels, FilteredTexel{});
-  for (int y = 0; y < kSlotSize; ++y)
-    for (int x = 0; x < kSlotSize; ++x) {
-      const auto at = static_cast<std::size_t>((y + r) * w.size + x + r);
-      if (w.patch[at] == kNone) continue;
-      const float* table = weights_of(at);
-      FilteredTexel& texel = out[static_cast<std::size_t>(y * kSlotSize + x)];
-      float weight = 0;
-      for (int d = -r; d <= r; ++d) {
-        const float g = d == 0 ? 1.0f : table[std::abs(d)];
-        const auto q = static_cast<std::size_t>(static_cast<int>(at) + d * w.size);
-        if (g == 0 || w.patch[q] != w.patch[at]) continue;
-        const float k =
-            d == 0 ? 1.0f : g * likeness(pooled_[q] - pooled_[at], pooled_variance_[q] + pooled_variance_[at]);
-        const Row& row = rows_[static_cast<std::size_t>((y + r + d) * kSlotSize + x)];
-        const float kn = k * row.weight;
-        for (std::size_t c = 0; c < 3; ++c) texel.irradiance[c] += kn * row.irradiance[c];
-        weight += kn;
-        texel.variance += kn * kn * row.variance;
-      }
-      if (weight < kLeastSum) continue;
-      for (float& channel : texel.irradiance) channel /= weight;
-      texel.variance /= weight * weight;
-      texel.known = true;
-    }
+  statistics_.run(w, target);
+  if (statistics_.widest_class() == 0) return;
+  with_slope_ = !w.first_pass();
+  prepare(w);
+  find_lit(w);
+  filter_rows(w);
+  filter_columns(w, out);
 }
 
 }  // namespace darm::renderer

@@ -1,68 +1,58 @@
 // Removes noise from soft light while it converges: a cross-bilateral filter over irradiance, so that textures (albedo)
-// stay sharp, which narrows as samples come in and vanishes at the end, so that the limit is unbiased.
+// stay sharp, which narrows as the texel's own error falls and vanishes at the end, so that the limit is unbiased.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "actors/renderer/filter_statistics.hpp"
+#include "actors/renderer/filter_window.hpp"
+#include "actors/renderer/line_fits.hpp"
+
 namespace darm::renderer {
 
-/// Widest filter, texels to each side.
-inline constexpr int kMaxFilterRadius = 10;
-
-/// A square window of texels with a margin of `radius` around the 32x32 that are filtered. Row-major, one value a
-/// texel. Texels with count 0 give nothing, but are given what the others of their patch (0xffffffff: none) have.
-struct FilterWindow {
-  int radius = 0;
-  int size = 0;  ///< 32 + 2 * radius
-  std::vector<std::uint32_t> patch;
-  std::vector<float> count;                      ///< samples
-  std::array<std::vector<float>, 3> irradiance;  ///< soft light of a white surface
-  std::vector<float> grey;                       ///< its luminance
-  std::vector<float> grey_m2;                    ///< sum of squared deviations of the samples of `grey`
-
-  void reset(int new_radius);
-};
-
-/// Filtered texel, and the variance of its grey value.
+/// Filtered texel.
 struct FilteredTexel {
   std::array<float, 3> irradiance{};
-  float variance = 0;
+  float variance = 0;  ///< of its grey value: noise
+  /// Square of what the filter has smeared of its grey value: the square difference to the mean it was compared by
+  /// (of fewer texels, at borders only of those along it), less what noise alone makes of that; and the square of what
+  /// outliers were held down by. Below 0 by chance: only sums over many texels say something.
+  float smear = 0;
   bool known = false;
 };
 
-/// Radius needed for texels of `count` samples to reach `target` effective samples; 0 when they have them.
-[[nodiscard]] int filter_radius(float count, float target);
-
-/// Two one-dimensional passes (an approximation of the full kernel). Weights: Gaussian with the width at which count *
-/// effective area = target; same patch only; likeness of the grey irradiance, pooled around each texel, in units of its
-/// own standard error (idea of SVGF, Schied et al. 2017, section 4.4, here from sample statistics instead of history).
-/// The variance treats texels as independent. Writes 32x32 texels.
+/// Two one-dimensional passes (an approximation of the full kernel). Weights: Gaussian over the texels that bring the
+/// error to what WindowStatistics says; same patch; likeness of the grey
+/// irradiance, pooled around each texel, in units of its own standard error (idea of SVGF, Schied et al. 2017, section
+/// 4.4, here from sample statistics instead of history). The variance treats texels as independent. Writes 32x32
+/// texels. A function of window and `target` alone. Keeps scratch memory: one per thread.
 class IrradianceFilter {
  public:
+  IrradianceFilter();
   void run(const FilterWindow& window, float target, std::vector<FilteredTexel>& out);
 
  private:
-  [[nodiscard]] static int pool_radius(const FilterWindow& window);
-  void pool(const FilterWindow& window);
-  void prepare_weights(float target);
+  static constexpr int kBlocks = kSlotSize / kLanes;  // in a row
+  void prepare(const FilterWindow& window);
+  void find_lit(const FilterWindow& window);
+  void filter_rows(const FilterWindow& window);
+  void filter_columns(const FilterWindow& window, std::vector<FilteredTexel>& out);
+  [[nodiscard]] float smear_of(std::size_t at, const FilteredTexel& texel, float weight) const;
+  [[nodiscard]] int reach_of(std::size_t first) const;
+  [[nodiscard]] FitCentres centres_at(const FilterWindow& window, std::size_t first) const;
+  [[nodiscard]] Fitted& block(int y, int number) { return rows_[static_cast<std::size_t>(y * kBlocks + number)]; }
 
-  struct Row {
-    std::array<float, 3> irradiance{};
-    float variance = 0;
-    float weight = 0;
-  };
-  struct PoolSum {
-    float samples = 0, sum = 0, squares = 0;  // of differences to a pivot
-  };
-  std::vector<PoolSum> pool_rows_;
-  std::vector<float> pooled_;           // mean of grey around each texel
-  std::vector<float> pooled_variance_;  // of that mean
-  std::vector<float> texel_variance_;   // of the texel's own mean
-  std::vector<Row> rows_;               // after the horizontal pass: 32 wide, size high
-  std::vector<float> weights_;          // [count][distance]
-  float weights_target_ = -1;
+  WindowStatistics statistics_;
+  bool with_slope_ = true;
+  std::vector<float> variance_;                       // of each texel's mean
+  std::vector<float> first_;                          // the Gaussian's value one texel away
+  std::vector<std::uint8_t> lit_;                     // some of the kLanes texels from here on has samples
+  std::vector<Fitted> rows_;                          // after the horizontal pass: [row][block]
+  std::vector<std::uint8_t> filled_;                  // some of that block is known
+  std::array<float, kAreaClasses> firsts_{};          // of each class: that value
+  std::array<std::uint8_t, kAreaClasses> reaches_{};  // and the last texel it reaches
 };
 
 }  // namespace darm::renderer

@@ -51,15 +51,20 @@ float outlier_bound(float count) { return 2.0f + 24.0f / count + count / 64.0f; 
 
 void tame_outliers(FilterWindow& w) {
   const Around around = look_around(w);  // judged by what was measured, not by what was tamed
+  double taken = 0;
+  int texels = 0;
   for (std::size_t at = 0; at < w.grey.size(); ++at) {
+    texels += w.count[at] > 0 ? 1 : 0;
     if (w.count[at] <= 0 || w.count[at] >= kOutlierSamples || around.samples[at] < kFewNeighbours) continue;
     const float bound = around.sum[at] / around.samples[at] * outlier_bound(w.count[at]);
     if (w.grey[at] <= bound) continue;
     const float scale = bound / w.grey[at];  // grey > bound >= 0
+    taken += double{w.grey[at]} - double{bound};
     for (auto& channel : w.irradiance) channel[at] *= scale;
     w.grey[at] *= scale;
     w.grey_m2[at] *= scale * scale;
   }
+  w.held_down = static_cast<float>(taken / std::max(texels, 1));
 }
 
 }  // namespace darm::renderer

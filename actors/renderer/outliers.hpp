@@ -1,7 +1,7 @@
 // Keeps rare bright samples from being smeared into spots while there are too few samples to average them away.
 #pragma once
 
-#include "actors/renderer/filter_irradiance.hpp"
+#include "actors/renderer/filter_window.hpp"
 
 namespace darm::renderer {
 
@@ -14,7 +14,7 @@ inline constexpr float kOutlierSamples = 1024;
 /// nothing is held down; what is held down meanwhile darkens the picture, never the store.
 [[nodiscard]] float outlier_bound(float count);
 
-/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike.
+/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was.
 void tame_outliers(FilterWindow& window);
 
 }  // namespace darm::renderer

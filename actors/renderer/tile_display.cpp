@@ -32,6 +32,8 @@ Step step_of(int coordinate) {
 
 struct SlotColours {
   SlotFill<3> fill;
+  std::array<float, kSlotTexels> variance{};  // of the reflected light's luminance
+  std::array<float, kSlotTexels> smear{};     // its other square error, as FilteredTexel has it
 };
 
 void TileDisplay::look_around(TileId id, const LevelTiles& level) {
@@ -45,30 +47,32 @@ void TileDisplay::look_around(TileId id, const LevelTiles& level) {
   }
 }
 
-int TileDisplay::radius_of(const TexelMask& mask) const {
+bool TileDisplay::wants_filter(const TexelMask& mask) const {
   const auto& own = around_[4];
-  if (options_.filter_samples <= 0 || !own.light || !own.facts) return 0;
-  float least = 0;
-  for (int t = 0; t < kTileTexels; ++t) {
-    if (!mask.test(t)) continue;
-    const float n = own.light->count(Layer::kSoft, t);
-    if (n > 0 && (least == 0 || n < least)) least = n;
-  }
-  return filter_radius(least, options_.filter_samples);
+  if (options_.filter_samples <= 0 || !own.light || !own.facts) return false;
+  for (int t = 0; t < kTileTexels; ++t)
+    if (mask.test(t) && own.light->count(Layer::kSoft, t) > 0) return true;
+  return false;
 }
 
-void TileDisplay::gather(int radius) {
-  window_.reset(radius);
+void TileDisplay::gather() {
+  window_.reset(kMaxFilterRadius);
   for (int y = 0; y < window_.size; ++y) {
-    const Step row = step_of(y - radius - 1);
+    const Step row = step_of(y - window_.radius - 1);
     for (int x = 0; x < window_.size; ++x) {
-      const Step column = step_of(x - radius - 1);
+      const Step column = step_of(x - window_.radius - 1);
       const auto& from = around_[static_cast<std::size_t>(row.tile * 3 + column.tile)];
       const auto at = static_cast<std::size_t>(y * window_.size + x);
       const int texel = row.texel * kTileSize + column.texel;
       if (!from.facts) continue;
       window_.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
       if (!from.light || window_.patch[at] == kNobody) continue;
+      if (from.facts->knows_albedo(texel) && from.light->count(Layer::kSharp, texel) > 0) {
+        const glm::vec3 albedo = from.facts->albedo(texel);
+        window_.tint[at] = options_.exposure * luminance(albedo);
+        window_.floor[at] = options_.exposure *
+                            luminance(from.light->mean(Layer::kSharp, texel) * albedo + from.facts->emission(texel));
+      }
       const float n = from.light->count(Layer::kSoft, texel);
       if (n <= 0) continue;
       const glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
@@ -94,6 +98,7 @@ TileDisplay::Lit TileDisplay::light_of(const Neighbour& from, int texel, const F
   if (filtered.known) {
     lit.has_soft = true;
     lit.soft = {{filtered.irradiance[0], filtered.irradiance[1], filtered.irradiance[2]}, filtered.variance};
+    lit.smear = filtered.smear;
   } else if (from.light->count(Layer::kSoft, texel) > 0) {
     lit.has_soft = true;
     lit.soft.mean = from.light->mean(Layer::kSoft, texel);
@@ -113,8 +118,7 @@ void TileDisplay::add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm:
   lit.has_sharp = lit.has_soft = true;
 }
 
-void TileDisplay::shade_slot(TileId id, const LevelTiles& level, std::vector<float>& variance, SlotColours& colours) {
-  variance.assign(kSlotTexels, 0.0f);
+void TileDisplay::shade_slot(TileId id, const LevelTiles& level, SlotColours& colours) {
   if (level.x == 0) return;  // no such level
   const glm::vec2 first(static_cast<float>(id.index() % level.x * kTileSize) - 0.5f,
                         static_cast<float>(id.index() / level.x * kTileSize) - 0.5f);  // centre of slot texel (0, 0)
@@ -134,7 +138,8 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, std::vector<flo
       if (!lit.has_sharp || !lit.has_soft) continue;  // filled from those that have it
       const glm::vec3 albedo = from.facts->albedo(texel);
       const float grey = luminance(albedo);
-      variance[at] = grey * grey * (lit.soft.variance + lit.sharp.variance);
+      colours.variance[at] = grey * grey * (lit.soft.variance + lit.sharp.variance);
+      colours.smear[at] = grey * grey * lit.smear;
       const glm::vec3 all =
           ((lit.sharp.mean + lit.soft.mean) * albedo + from.facts->emission(texel)) * options_.exposure;
       colours.fill.set(static_cast<int>(at), {all.x, all.y, all.z});
@@ -142,9 +147,10 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, std::vector<flo
   }
 }
 
-float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const std::vector<float>& variance,
+float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const SlotColours& colours,
                             const std::array<bool, kSlotTexels>& known, float& samples) const {
   double squares = 0;
+  double smear = 0;
   double count = 0;
   int texels = 0;
   for (int t = 0; t < kTileTexels; ++t) {
@@ -159,27 +165,26 @@ float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const
     }
     const std::uint8_t* rgb = &image.rgb[at * 3];
     const auto code = static_cast<std::uint8_t>(std::lround(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]));
-    const double e = double{srgb_slope(code)} * options_.exposure * std::sqrt(double{std::max(variance[at], 0.0f)});
-    squares += std::min(e * e, 0.25);
+    const double shown = double{srgb_slope(code)} * double{options_.exposure};
+    squares += std::min(shown * shown * double{std::max(colours.variance[at], 0.0f)}, 0.25);
+    smear += std::clamp(shown * shown * double{colours.smear[at]}, -0.25, 0.25);
   }
   if (texels == 0) return samples = 0;
   samples = static_cast<float>(count / texels);
-  return static_cast<float>(std::sqrt(squares / texels));
+  return static_cast<float>(std::sqrt((squares + std::max(smear, 0.0)) / texels));
 }
 
 std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level, const TexelMask& mask) {
   look_around(id, level);
-  const int radius = radius_of(mask);
-  if (radius > 0) {
-    gather(radius);
+  if (wants_filter(mask)) {
+    gather();
     tame_outliers(window_);
     filter_.run(window_, options_.filter_samples, filtered_);
   } else {
     filtered_.assign(kSlotTexels, FilteredTexel{});
   }
-  std::vector<float> variance;
   SlotColours colours;
-  shade_slot(id, level, variance, colours);
+  shade_slot(id, level, colours);
   if (std::none_of(colours.fill.known.begin(), colours.fill.known.end(), [](bool k) { return k; })) return std::nullopt;
   const auto known = colours.fill.known;  // before the others are filled
   colours.fill.run();
@@ -191,7 +196,7 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   if (around_[4].facts) image->coverage = around_[4].facts->coverage;
 
   TilePicture picture;
-  picture.error = error_of(*image, mask, variance, known, picture.samples);
+  picture.error = error_of(*image, mask, colours, known, picture.samples);
   picture.image = std::move(image);
   return picture;
 }

@@ -21,8 +21,8 @@ struct DisplayOptions {
 
 struct TilePicture {
   std::shared_ptr<const TileImage> image;
-  float error = 0;    ///< RMS over the mask's texels of the display-space standard error, 0..1. Noise only: what the
-                      ///< filter smears is not in it
+  float error = 0;    ///< RMS over the mask's texels of the display-space error expected, 0..1: noise, and what the
+                      ///< filter smears and holds down
   float samples = 0;  ///< mean samples per texel of the mask
 };
 
@@ -48,18 +48,19 @@ class TileDisplay {
     std::shared_ptr<const TileFacts> facts;
   };
   void look_around(TileId id, const LevelTiles& level);
-  [[nodiscard]] int radius_of(const TexelMask& mask) const;
-  void gather(int radius);
+  [[nodiscard]] bool wants_filter(const TexelMask& mask) const;
+  void gather();
   struct Lit {
     bool has_sharp = false;
     bool has_soft = false;
     LayerLight sharp;
     LayerLight soft;
+    float smear = 0;  // of the soft light, as FilteredTexel has it
   };
   [[nodiscard]] static Lit light_of(const Neighbour& from, int texel, const FilteredTexel& filtered);
   void add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm::vec2& at) const;
-  void shade_slot(TileId id, const LevelTiles& level, std::vector<float>& variance, struct SlotColours& colours);
-  [[nodiscard]] float error_of(const TileImage& image, const TexelMask& mask, const std::vector<float>& variance,
+  void shade_slot(TileId id, const LevelTiles& level, struct SlotColours& colours);
+  [[nodiscard]] float error_of(const TileImage& image, const TexelMask& mask, const struct SlotColours& colours,
                                const std::array<bool, kSlotTexels>& known, float& samples) const;
 
   const atlas::RadianceStore& store_;

@@ -28,6 +28,7 @@ TEST(Outliers, ALoneBrightTexelIsHeldToItsBound) {
   EXPECT_NEAR(w.irradiance[1][at], outlier_bound(8), 1e-4);
   EXPECT_LT(w.grey_m2[at], 1);
   EXPECT_EQ(w.grey[at + 1], 1);
+  EXPECT_NEAR(w.held_down * 36 * 36, 100 - outlier_bound(8), 1e-2);
 }
 
 TEST(Outliers, AnEdgeOfLightStays) {

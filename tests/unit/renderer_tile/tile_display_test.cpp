@@ -116,7 +116,7 @@ TEST_F(TileDisplayTest, filter_vanishes_as_samples_come_in) {
   world_.world.light = [](TileId id, int t, std::uint32_t s) {
     return TexelLight{{}, glm::vec3((t % 30 < 11 ? 0.5f : 0.02f) * 2 * noise_of(id, t, s))};
   };
-  for (int i = 0; i < 8; ++i) shade(middle_, 50);
+  for (int i = 0; i < 8; ++i) shade(middle_, 500);
   const auto with = draw(middle_);
   const auto without = draw(middle_, 0);
   EXPECT_EQ(with.image->rgb, without.image->rgb);
