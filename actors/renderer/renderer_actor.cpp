@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kPicturesPerSlice = 8;
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
-constexpr std::uint64_t kDisplayVersion = 3;
+constexpr std::uint64_t kDisplayVersion = 4;
 
 // What a stored picture depends on beside its light.
 std::uint64_t picture_tag_of(const DisplayOptions& display) {
