@@ -82,6 +82,12 @@ class TileView {
   [[nodiscard]] float count(Layer layer, int texel) const {
     return planes_[(static_cast<int>(layer) + 3) * kTileTexels + texel];
   }
+  /// No sample of many brought any light: the texel lies inside other geometry (a foot under its floor), or is closed
+  /// off. Its black is right where it is, and wrong in a mean with the texels beside it.
+  [[nodiscard]] bool lightless(int texel) const {
+    return count(Layer::kSoft, texel) >= kLightlessSamples && mean(Layer::kSoft, texel) == glm::vec3(0.0f) &&
+           mean(Layer::kSharp, texel) == glm::vec3(0.0f);
+  }
   /// Variance of the mean's luminance (standard error squared). 0 samples: +inf is never returned, but `unknown`.
   [[nodiscard]] float variance_of_mean(Layer layer, int texel, float unknown) const {
     const float n = count(layer, texel);
@@ -90,6 +96,7 @@ class TileView {
   }
 
  private:
+  static constexpr float kLightlessSamples = 16;  // paths; one that ends in stored light brings some nearly always
   const float* planes_ = nullptr;
   const TileAlbedo* albedo_ = nullptr;
 };

@@ -22,7 +22,7 @@ std::array<StoredTexel, kTileTexels> stored_texels(const atlas::TileView& tile,
   for (int t = 0; t < kTileTexels; ++t) {
     auto& texel = out[static_cast<std::size_t>(t)];
     texel = StoredTexel{};
-    if (tile.count(Layer::kSharp, t) <= 0) continue;
+    if (tile.count(Layer::kSharp, t) <= 0 || tile.lightless(t)) continue;
     const auto slot = static_cast<std::size_t>((t / kTileSize + 1) * kSlotSize + t % kTileSize + 1);
     const bool smooth = slot < filtered.size() && filtered[slot].known;
     if (!smooth && tile.count(Layer::kSoft, t) <= 0) continue;

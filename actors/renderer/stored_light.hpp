@@ -26,7 +26,7 @@ struct StoredTexel {
 };
 
 /// What a tile of the store holds, as StoredTexels; soft light as filtered in `filtered` (32x32, of a slot with its
-/// border) where that is known.
+/// border) where that is known. Lightless texels stay unknown.
 [[nodiscard]] std::array<StoredTexel, kTileTexels> stored_texels(const atlas::TileView& tile,
                                                                  std::span<const FilteredTexel> filtered);
 

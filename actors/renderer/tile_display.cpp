@@ -34,6 +34,7 @@ struct SlotColours {
   SlotFill<3> fill;
   std::array<float, kSlotTexels> variance{};  // of the reflected light's luminance
   std::array<float, kSlotTexels> smear{};     // its other square error, as FilteredTexel has it
+  std::array<bool, kSlotTexels> lightless{};
 };
 
 void TileDisplay::look_around(TileId id, const LevelTiles& level) {
@@ -74,7 +75,7 @@ void TileDisplay::gather() {
                             luminance(from.light->mean(Layer::kSharp, texel) * albedo + from.facts->emission(texel));
       }
       const float n = from.light->count(Layer::kSoft, texel);
-      if (n <= 0) continue;
+      if (n <= 0 || from.light->lightless(texel)) continue;
       const glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
       window_.count[at] = n;
       for (int c = 0; c < 3; ++c) window_.irradiance[static_cast<std::size_t>(c)][at] = soft[c];
@@ -88,6 +89,10 @@ void TileDisplay::gather() {
 TileDisplay::Lit TileDisplay::light_of(const Neighbour& from, int texel, const FilteredTexel& filtered) {
   Lit lit;
   if (!from.light) return lit;
+  if (from.light->lightless(texel)) {
+    lit.lightless = lit.has_sharp = lit.has_soft = true;
+    return lit;
+  }
   if (from.light->count(Layer::kSharp, texel) > 0) {
     lit.has_sharp = true;
     lit.sharp.mean = from.light->mean(Layer::kSharp, texel);
@@ -143,6 +148,7 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, SlotColours& co
       const glm::vec3 all =
           ((lit.sharp.mean + lit.soft.mean) * albedo + from.facts->emission(texel)) * options_.exposure;
       colours.fill.set(static_cast<int>(at), {all.x, all.y, all.z});
+      colours.lightless[at] = lit.lightless;
     }
   }
 }
@@ -187,6 +193,7 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   shade_slot(id, level, colours);
   if (std::none_of(colours.fill.known.begin(), colours.fill.known.end(), [](bool k) { return k; })) return std::nullopt;
   const auto known = colours.fill.known;  // before the others are filled
+  colours.fill.replace_by_neighbours(colours.lightless);
   colours.fill.run();
 
   auto image = std::make_shared<TileImage>();

@@ -36,6 +36,8 @@ class TileDisplay {
 
   /// The slot's 32x32 texels: payload and border (from the neighbour tiles where they are shaded), soft light filtered,
   /// texels without samples lit as the coarse level has their place, else filled from their patch, then from anything.
+  /// Lightless texels give the filter nothing, and show the mean of the lit ones beside them, if there are any: a
+  /// client's bilinear tap at a contact reads them.
   /// nullopt if nothing is known of any texel of the slot.
   std::optional<TilePicture> draw(TileId id, const LevelTiles& level, const TexelMask& mask);
 
@@ -51,6 +53,7 @@ class TileDisplay {
   [[nodiscard]] bool wants_filter(const TexelMask& mask) const;
   void gather();
   struct Lit {
+    bool lightless = false;
     bool has_sharp = false;
     bool has_soft = false;
     LayerLight sharp;

@@ -27,6 +27,23 @@ struct SlotFill {
     spread(true);
     spread(false);
   }
+  /// Gives each known texel of `which` the mean of the known ones beside it that are of its patch and not of `which`;
+  /// it keeps its value where there is none.
+  void replace_by_neighbours(const std::array<bool, kSlotTexels>& which) {
+    for (std::size_t at = 0; at < which.size(); ++at) {
+      if (!which[at] || !known[at]) continue;
+      Value sum{};
+      float n = 0;
+      each_neighbour(static_cast<int>(at), [&](std::size_t, std::size_t from) {
+        if (!known[from] || which[from] || patch[from] != patch[at]) return;
+        for (std::size_t c = 0; c < Channels; ++c) sum[c] += value[from][c];
+        n += 1;
+      });
+      if (n == 0) continue;
+      for (auto& c : sum) c /= n;
+      value[at] = sum;
+    }
+  }
   /// Within patches only: what has no known texel of its own patch stays zero.
   void run_within_patches() { spread(true); }
 

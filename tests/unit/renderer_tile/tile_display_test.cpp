@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/texel_shading.hpp"
 #include "tests/unit/renderer_tile/made_up_surface.hpp"
 
@@ -109,6 +110,27 @@ TEST_F(TileDisplayTest, filter_removes_noise_and_keeps_texture_and_patch_edges) 
   const double raw = rms(draw(middle_, 0));
   const double filtered = rms(draw(middle_));
   EXPECT_LT(filtered, raw / 4);
+}
+
+TEST_F(TileDisplayTest, texels_inside_other_geometry_do_not_darken_those_beside_them) {
+  world_.world.patch = [](TileId, int, int y) { return y < 20 ? 1u : 2u; };
+  world_.world.light = [](TileId id, int t,
+                          std::uint32_t s) {  // a wall stands on the left third, all over the lower patch
+    if (t % 30 < 10 || t / 30 >= 20) return TexelLight{};
+    return TexelLight{glm::vec3(0.1f), glm::vec3(0.4f * (0.8f + 0.4f * noise_of(id, t, s)))};
+  };
+  shade(middle_, 32);
+  TileDisplay display(*store_, facts_, DisplayOptions{1.0f, 384});
+  const auto picture = display.draw(middle_, level_, TexelMask::all()).value();
+  for (int y = 1; y < 19; ++y) {
+    EXPECT_NEAR(code(picture, 10, y), srgb_code(0.5f), 3);
+    EXPECT_NEAR(code(picture, 9, y), srgb_code(0.5f), 3);  // what a bilinear tap at the contact reads
+    EXPECT_EQ(code(picture, 8, y), 0);
+  }
+  for (int x = 1; x < 29; ++x) EXPECT_EQ(code(picture, x, 25), 0);  // all dark is dark
+  const auto stored = stored_texels(*store_->read(middle_), display.filtered());
+  EXPECT_FALSE(stored[9].known);  // no path ends there
+  EXPECT_TRUE(stored[10].known);
 }
 
 TEST_F(TileDisplayTest, filter_vanishes_as_samples_come_in) {
