@@ -64,6 +64,7 @@ encoder::EncoderOptions encoder_options(const config::Config& config, StreamId s
   options.chroma_444 = format.chroma_444;
   options.lossless_rgb = format.lossless_rgb;
   options.crf = static_cast<float>(config.stream.crf);
+  options.crf_finest = static_cast<float>(config.stream.crf_finest);
   options.preset = config.stream.preset;
   options.frames_per_second = static_cast<float>(config.stream.updates_per_second);
   return options;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 
+#include "actors/encoder/codec_quality.hpp"
 #include "actors/encoder/h264_encoder.hpp"
 #include "actors/encoder/phystex_picture.hpp"
 
@@ -19,7 +20,7 @@ double seconds(Microseconds from, Microseconds to) { return static_cast<double>(
 
 // Picture and codec of the stream. The codec may be missing after a failure; the next key frame makes it anew.
 struct EncoderActor::Pipeline {
-  explicit Pipeline(const EncoderOptions& o) : lossless(o.lossless_rgb) {
+  explicit Pipeline(const EncoderOptions& o) : lossless(o.lossless_rgb), quality(o.crf, o.crf_finest) {
     settings.width = o.phystex_size;
     settings.height = o.phystex_size;
     settings.chroma_444 = o.chroma_444;
@@ -32,6 +33,7 @@ struct EncoderActor::Pipeline {
   }
   H264Settings settings;
   bool lossless;
+  CodecQuality quality;
   std::optional<PhysTexPicture> picture;
   std::unique_ptr<H264Encoder> encoder;
 };
@@ -43,7 +45,8 @@ struct EncoderActor::Job {
   Microseconds started = 0;
   Microseconds composed = 0;
   Microseconds encoded = 0;
-  std::string error;  // empty: frame is good
+  bool settled = true;  // the same picture again would not be finer
+  std::string error;    // empty: frame is good
 };
 
 EncoderActor::EncoderActor(runtime::Context<Inbox> context, EncoderOptions options, Receivers receivers,
@@ -108,6 +111,8 @@ void EncoderActor::run(Pipeline& pipeline, Job& job, const runtime::Executor& ex
         }
       }
       if (job.error.empty()) {
+        pipeline.encoder->set_crf(pipeline.quality.next(frame.key, frame.error, job.composed));
+        job.settled = pipeline.quality.settled();
         auto bytes = pipeline.encoder->encode(pipeline.picture->view(), frame.key);
         if (bytes) {
           frame.h264 = std::move(*bytes);
@@ -130,7 +135,7 @@ void EncoderActor::on(PictureEncoded&& event) {
   key_required_ = !job->error.empty();
   record(*job);
   if (job->error.empty()) publish(*job);
-  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty()));
+  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled));
   while (!job_ && !waiting_.empty()) {
     auto next = std::move(waiting_.front());
     waiting_.pop_front();

@@ -23,7 +23,8 @@ struct EncoderOptions {
   std::uint32_t phystex_size = 2048;  ///< pixels per side, a multiple of 32; up to 8192 with a codec
   bool chroma_444 = false;
   bool lossless_rgb = false;  ///< no codec: tiles go out as they are
-  float crf = 16.0f;
+  float crf = 16.0f;          ///< while light is rough, and of key frames
+  float crf_finest = 8.0f;    ///< reached as light gets exact (CodecQuality)
   std::string preset = "superfast";
   std::string codec = "libx264";
   unsigned threads = 1;

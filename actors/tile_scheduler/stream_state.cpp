@@ -43,7 +43,8 @@ StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& 
   std::vector<ViewAnswer> answers;
   for (auto& [session, answer] : answers_) answers.push_back(answer);
   answers_.clear();
-  if (!frame.key && frame.writes.empty() && frame.edits.empty()) {
+  const bool polish = !settled_ && now - sent_at_ >= options_.polish_interval;
+  if (!frame.key && frame.writes.empty() && frame.edits.empty() && !polish) {
     out.no_change = std::move(answers);
     return out;
   }
@@ -58,9 +59,10 @@ StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& 
   return out;
 }
 
-void StreamState::frame_done(FrameNumber number, bool ok) {
+void StreamState::frame_done(FrameNumber number, bool ok, bool settled) {
   if (number != in_flight_ || number == 0) return;  // a frame given up for lost, reported late
   in_flight_ = 0;
+  settled_ = settled;
   auto answers = std::exchange(answers_in_flight_, {});
   if (ok) return;
   key_pending_ = true;

@@ -32,6 +32,8 @@ struct StreamOptions {
   /// Least time between frames that only refine what is shown: encoding one costs the same whether it holds one tile or
   /// a hundred, and that time is taken from shading. Frames with new tiles never wait.
   Microseconds refine_interval = 0;
+  /// Least time until a frame without any change, which the codec uses to come nearer to the same picture.
+  Microseconds polish_interval = 800'000;
 };
 
 /// Slots of a PhysTex; at most 65535, because slots are named by 16 bits and one value means none.
@@ -56,8 +58,9 @@ class StreamState {
   /// slots; only those with an image enter. Nothing happens while a frame is in flight.
   [[nodiscard]] StreamStep step(std::span<const TileId> wanted, const ImageLookup& images, float error,
                                 Microseconds now);
-  /// The encoder is done with frame `number`. A failed frame makes the next one a key frame and is answered again.
-  void frame_done(FrameNumber number, bool ok);
+  /// The encoder is done with frame `number`. A failed frame makes the next one a key frame and is answered again. Not
+  /// `settled`: coded again, the same picture would be finer, so a frame follows even if nothing changes.
+  void frame_done(FrameNumber number, bool ok, bool settled = true);
 
   [[nodiscard]] const PageTable& table() const { return table_; }
   [[nodiscard]] bool in_flight() const { return in_flight_ != 0; }
@@ -85,6 +88,7 @@ class StreamState {
   FrameNumber in_flight_ = 0;  // 0: none
   Microseconds sent_at_ = 0;
   bool key_pending_ = true;
+  bool settled_ = true;
 };
 
 }  // namespace darm::tile_scheduler

@@ -153,11 +153,11 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
 void TileSchedulerActor::on(FrameDone&& message) {
   for (auto& [id, session] : sessions_) {
     if (session->view_layer && session->view_stream_id == message.stream) {
-      session->view_layer->stream().frame_done(message.frame, message.ok);
+      session->view_layer->stream().frame_done(message.frame, message.ok, message.settled);
       return;
     }
     if (session->stream_id != message.stream) continue;
-    session->stream.frame_done(message.frame, message.ok);
+    session->stream.frame_done(message.frame, message.ok, message.settled);
     if (session->stream.has_answers()) compose(*session);
     return;
   }

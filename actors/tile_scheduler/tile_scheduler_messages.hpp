@@ -114,7 +114,9 @@ struct FrameDone {
   StreamId stream{};
   FrameNumber frame = 0;
   bool ok = true;
-  FrameDone(StreamId s, FrameNumber f, bool success) : stream(s), frame(f), ok(success) {}
+  bool settled = true;  ///< false: the same picture coded again would be finer
+  FrameDone(StreamId s, FrameNumber f, bool success, bool is_settled = true)
+      : stream(s), frame(f), ok(success), settled(is_settled) {}
 };
 
 /// Visibility of one session's view is traced (sent by the scheduler's own pool job to itself).

@@ -90,7 +90,8 @@ struct StreamConfig {
   std::uint32_t view_phystex =
       1024;  ///< largest private PhysTex offered where a scene calls for one: 0 (none), 512, 1024
   std::uint32_t max_writes = 1024;   ///< slots rewritten per frame at most
-  std::uint32_t crf = 18;            ///< x264 constant rate factor: 0 best .. 51 worst
+  std::uint32_t crf = 18;            ///< x264 constant rate factor: 0 best .. 51 worst; while light is rough
+  std::uint32_t crf_finest = 8;      ///< the same, reached as the estimated error of light falls; 51 turns that off
   std::string preset = "superfast";  ///< x264 preset
   bool chroma_444 = false;           ///< offer 4:4:4 to clients that can decode it
   bool allow_lossless = false;       ///< let clients ask for uncompressed tiles (evaluation only)

@@ -115,6 +115,7 @@ void read_work(TableReader& root, Config& config) {
     reader.one_of("view_phystex", config.stream.view_phystex, {0, 512, 1024});
     reader.integer("max_writes", config.stream.max_writes, 1, 16384);
     reader.integer("crf", config.stream.crf, 0, 51);
+    reader.integer("crf_finest", config.stream.crf_finest, 0, 51);
     reader.choice("preset", config.stream.preset,
                   {"ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"});
     reader.boolean("chroma_444", config.stream.chroma_444);

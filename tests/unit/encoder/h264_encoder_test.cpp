@@ -131,6 +131,34 @@ TEST(H264Encoder, lower_quality_takes_fewer_bytes) {
   EXPECT_LT(encoder->encode(noise.view(), true).value().size(), fine / 2);
 }
 
+TEST(H264Encoder, a_still_picture_comes_nearer_as_quality_rises) {
+  PhysTexPicture grain(256, false);
+  std::uint32_t state = 1;
+  for (SlotIndex slot = 0; slot < grain.slot_count(); ++slot) {
+    TileImage image;
+    for (auto& y : image.y) y = static_cast<std::uint8_t>(100 + ((state = state * 1664525u + 1013904223u) >> 27));
+    image.cb.fill(120);
+    image.cr.fill(130);
+    ASSERT_TRUE(grain.write(slot, image));
+  }
+  auto encoder = make(settings(256));
+  Decoder decoder;
+  const auto off = [&](bool key) {
+    const auto shown = decoder.decode(encoder->encode(grain.view(), key).value());
+    double squares = 0;
+    for (std::size_t i = 0; i < shown.plane[0].size(); ++i)
+      squares += std::pow(double{shown.plane[0][i]} - double{grain.view().plane[0][i]}, 2);
+    return std::sqrt(squares / static_cast<double>(shown.plane[0].size()));
+  };
+  const double first = off(true);
+  double last = off(false);
+  for (int crf = 16; crf >= 8; crf -= 2) {
+    encoder->set_crf(static_cast<float>(crf));
+    last = off(false);
+  }
+  EXPECT_LT(last, 0.5 * first);
+}
+
 TEST(H264Encoder, falls_back_to_libx264) {
   auto s = settings(256);
   s.codec = "no_such_encoder";

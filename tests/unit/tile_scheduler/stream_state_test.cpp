@@ -151,6 +151,25 @@ TEST(StreamState, AnswersACameraOnceByFrameOrByNoChange) {
   EXPECT_TRUE(third.no_change.empty());
 }
 
+TEST(StreamState, a_picture_that_is_not_settled_is_coded_again_though_nothing_changes) {
+  StreamOptions options;
+  options.polish_interval = 100;
+  StreamState stream(small(), options);
+  Images images;
+  const std::vector<TileId> wanted{TileId(0, 1)};
+  images.put(wanted[0], 1);
+  const auto first = stream.step(wanted, images.lookup(), 0.1f, 0);
+  ASSERT_TRUE(first.frame);
+  stream.frame_done(first.frame->frame, true, false);
+  EXPECT_FALSE(stream.step(wanted, images.lookup(), 0.1f, 99).frame);
+  const auto again = stream.step(wanted, images.lookup(), 0.1f, 100);
+  ASSERT_TRUE(again.frame);
+  EXPECT_FALSE(again.frame->key);
+  EXPECT_TRUE(again.frame->writes.empty());
+  stream.frame_done(again.frame->frame, true, true);
+  EXPECT_FALSE(stream.step(wanted, images.lookup(), 0.1f, 1000).frame);
+}
+
 TEST(StreamState, AFailedFrameIsAnsweredAgainByAKeyFrame) {
   StreamState stream(small(), {});
   Images images;
