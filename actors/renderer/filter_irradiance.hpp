@@ -16,6 +16,7 @@ namespace darm::renderer {
 struct FilteredTexel {
   std::array<float, 3> irradiance{};
   float variance = 0;  ///< of its grey value: noise
+  float texels = 1;    ///< so many gave to it, by what they took of the noise; >= 1
   /// Square of what the filter has smeared of its grey value: the square difference to the mean it was compared by
   /// (of fewer texels, at borders only of those along it), less what noise alone makes of that; and the square of what
   /// outliers were held down by. Below 0 by chance: only sums over many texels say something.

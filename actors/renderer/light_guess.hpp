@@ -17,6 +17,7 @@ struct LightGuess {
 struct LayerLight {
   glm::vec3 mean{0.0f};
   float variance = 0;  ///< expected square error of the mean's luminance
+  float texels = 1;    ///< over so many around it that error is the same, >= 1
 };
 
 /// A guess with its error: one and a half times the spread of the texels it comes from (a step between them may lie

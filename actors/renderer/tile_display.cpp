@@ -15,6 +15,14 @@ using atlas::Plane;
 
 namespace {
 
+// A pixel reads about five texels of its level, of equal weight: the level is chosen so that the pixel is 1 to 2 texels
+// wide along its lesser axis and often more along the other, and each of its 2x2 samples is bilinear.
+constexpr float kPixelTexels = 5;
+
+// What is left of a texel's variance in the mean that a pixel shows, if the errors of `texels` around it are the same:
+// the areas of two averages, one after the other, add.
+float left_in_pixel(float texels) { return texels / (texels + kPixelTexels - 1); }
+
 constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
 
 // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
@@ -32,7 +40,7 @@ Step step_of(int coordinate) {
 
 struct SlotColours {
   SlotFill<3> fill;
-  std::array<float, kSlotTexels> variance{};  // of the reflected light's luminance
+  std::array<float, kSlotTexels> variance{};  // of the reflected light's luminance in a pixel
   std::array<float, kSlotTexels> smear{};     // its other square error, as FilteredTexel has it
   std::array<bool, kSlotTexels> lightless{};
 };
@@ -102,7 +110,8 @@ TileDisplay::Lit TileDisplay::light_of(const Neighbour& from, int texel, const F
   }
   if (filtered.known) {
     lit.has_soft = true;
-    lit.soft = {{filtered.irradiance[0], filtered.irradiance[1], filtered.irradiance[2]}, filtered.variance};
+    lit.soft = {
+        {filtered.irradiance[0], filtered.irradiance[1], filtered.irradiance[2]}, filtered.variance, filtered.texels};
     lit.smear = filtered.smear;
   } else if (from.light->count(Layer::kSoft, texel) > 0) {
     lit.has_soft = true;
@@ -143,7 +152,9 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, SlotColours& co
       if (!lit.has_sharp || !lit.has_soft) continue;  // filled from those that have it
       const glm::vec3 albedo = from.facts->albedo(texel);
       const float grey = luminance(albedo);
-      colours.variance[at] = grey * grey * (lit.soft.variance + lit.sharp.variance);
+      colours.variance[at] =
+          grey * grey *
+          (lit.soft.variance * left_in_pixel(lit.soft.texels) + lit.sharp.variance * left_in_pixel(lit.sharp.texels));
       colours.smear[at] = grey * grey * lit.smear;
       const glm::vec3 all =
           ((lit.sharp.mean + lit.soft.mean) * albedo + from.facts->emission(texel)) * options_.exposure;

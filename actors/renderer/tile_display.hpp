@@ -21,8 +21,9 @@ struct DisplayOptions {
 
 struct TilePicture {
   std::shared_ptr<const TileImage> image;
-  float error = 0;    ///< RMS over the mask's texels of the display-space error expected, 0..1: noise, and what the
-                      ///< filter smears and holds down
+  /// RMS over the mask's texels of the display-space error expected, 0..1, of a pixel that reads about five of them:
+  /// noise, and what the filter smears and holds down.
+  float error = 0;
   float samples = 0;  ///< mean samples per texel of the mask
 };
 

@@ -17,7 +17,7 @@ Result<Recording> record(std::uint16_t port, const View& view, double seconds, S
   options.name = "darm-bench";
   options.max_view_phystex = 0;  // the reference is light that does not depend on the eye
   options.lossless = stream == Stream::kLossless;
-  if (options.lossless) options.max_phystex = 8192;
+  options.max_phystex = options.lossless ? 8192 : 4096;  // the set-up's `stream.phystex` decides
   auto connection = Connection::open(options);
   if (!connection) return std::unexpected(connection.error());
   Recording out;
