@@ -2,11 +2,15 @@
 
 #include <array>
 #include <cstring>
+#include <string_view>
 
 namespace darm::client::gles {
 namespace {
 
-Result<GLuint> compile(GLenum stage, const std::string& source) {
+constexpr std::string_view kEsVersion = "#version 300 es\n";
+
+Result<GLuint> compile(GLenum stage, std::string source) {
+  if (is_desktop() && source.starts_with(kEsVersion)) source.replace(0, kEsVersion.size(), "#version 330 core\n");
   const GLuint shader = glCreateShader(stage);
   const char* text = source.c_str();
   glShaderSource(shader, 1, &text, nullptr);
@@ -82,6 +86,25 @@ Renderbuffer make_renderbuffer(GLenum internal_format, std::uint32_t width, std:
   return Renderbuffer(id);
 }
 
+Result<Target> Target::create(GLenum format, std::uint32_t width, std::uint32_t height, bool depth) {
+  Target t;
+  t.width_ = width;
+  t.height_ = height;
+  if (depth) t.depth_ = make_renderbuffer(GL_DEPTH_COMPONENT32F, width, height);
+  t.texture_ = make_texture(format, width, height, GL_NEAREST);
+  t.framebuffer_ = make_framebuffer();
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, t.texture_.id(), 0);
+  if (depth) glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, t.depth_.id());
+  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+    return fail("GL: no render target of " + std::to_string(width) + "x" + std::to_string(height));
+  return t;
+}
+
+void Target::bind() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+  glViewport(0, 0, static_cast<GLsizei>(width_), static_cast<GLsizei>(height_));
+}
+
 Result<Program> Program::link(const std::string& vertex, const std::string& fragment) {
   const auto v = compile(GL_VERTEX_SHADER, vertex);
   if (!v) return std::unexpected(v.error());
@@ -124,6 +147,11 @@ bool has_extension(const char* name) {
     if (extension != nullptr && std::strcmp(extension, name) == 0) return true;
   }
   return false;
+}
+
+bool is_desktop() {
+  const auto* version = reinterpret_cast<const char*>(glGetString(GL_VERSION));
+  return version != nullptr && std::strncmp(version, "OpenGL ES", 9) != 0;
 }
 
 }  // namespace darm::client::gles

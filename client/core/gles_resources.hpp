@@ -47,7 +47,26 @@ using VertexArray = Name<Kind::kVertexArray>;
 [[nodiscard]] Framebuffer make_framebuffer();
 [[nodiscard]] Renderbuffer make_renderbuffer(GLenum internal_format, std::uint32_t width, std::uint32_t height);
 
-/// A linked program; uniforms that it does not use are ignored when set.
+/// A colour texture to draw into and, where asked for, a depth buffer beside it.
+class Target {
+ public:
+  [[nodiscard]] static Result<Target> create(GLenum format, std::uint32_t width, std::uint32_t height, bool depth);
+  /// As the framebuffer, all of it.
+  void bind() const;
+  [[nodiscard]] GLuint texture() const { return texture_.id(); }
+  [[nodiscard]] GLuint framebuffer() const { return framebuffer_.id(); }
+  [[nodiscard]] std::uint32_t width() const { return width_; }
+  [[nodiscard]] std::uint32_t height() const { return height_; }
+
+ private:
+  Texture texture_;
+  Renderbuffer depth_;
+  Framebuffer framebuffer_;
+  std::uint32_t width_ = 0, height_ = 0;
+};
+
+/// A linked program; uniforms that it does not use are ignored when set. Sources are GLSL ES 3.00; where the context is
+/// one of desktop OpenGL (3.3 or later) the same text is compiled as GLSL 3.30.
 class Program {
  public:
   [[nodiscard]] static Result<Program> link(const std::string& vertex, const std::string& fragment);
@@ -60,5 +79,7 @@ class Program {
 };
 
 [[nodiscard]] bool has_extension(const char* name);
+/// The context is one of desktop OpenGL, not of OpenGL ES.
+[[nodiscard]] bool is_desktop();
 
 }  // namespace darm::client::gles

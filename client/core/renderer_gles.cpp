@@ -56,23 +56,21 @@ struct GlesRenderer::State {
   std::map<std::uint32_t, gles::Program> surfaces;
   std::optional<gles::Program> depth, background, background_stats, resolve;
   gles::VertexArray empty_array;
-  gles::Framebuffer samples_target, stats_target, picture_target;
-  gles::Texture samples, stats, picture;
-  gles::Renderbuffer depth_buffer;
-  std::uint32_t width = 0, height = 0, largest = 0;
+  gles::Target samples, picture, stats;
+  std::uint32_t largest = 0;
   bool linear = false;
   ClipControl clip_control = nullptr;
 
   explicit State(StreamTextures t) : textures(std::move(t)) {}
 
   Result<gles::Program*> surface(const SurfaceVariant& variant);
-  Result<void> make_targets(std::uint32_t w, std::uint32_t h);
-  Result<void> make_stats_target();
+  Result<void> make_targets(std::uint32_t width, std::uint32_t height);
+  Result<void> fit(gles::Target& target, GLenum format, std::uint32_t width, std::uint32_t height, bool with_depth);
   void add_chunk(const SceneModel& scene, std::uint32_t index);
   void draw_background(const SceneModel& scene, const View& view, bool stats_pass);
   Result<void> draw_items(const SceneModel& scene, const View& view, const std::vector<Item>& items, Pass pass,
                           bool blend);
-  Result<void> draw_scene(const SceneModel& scene, const View& view, bool stats_pass);
+  Result<void> draw_scene(const SceneModel& scene, const View& view, const gles::Target& target, bool stats_pass);
   void set_frame_uniforms(gles::Program& program, const SceneModel& scene) const;
   void set_blending(const InstanceShape& instance) const;
   Result<gles::Program*> use_program(const SceneModel& scene, const InstanceShape& instance, Pass pass, bool blend);
@@ -80,6 +78,7 @@ struct GlesRenderer::State {
                          Pass pass, bool blend, Faces faces);
   Result<void> draw_clear_item(const SceneModel& scene, const View& view, const Item& item, const glm::dmat4& to_clip);
   gles::Program* current = nullptr;  // whose frame uniforms are set
+  float samples_per_axis = 1;        // of a pixel, in what is drawn now
 };
 
 namespace {
@@ -104,6 +103,16 @@ bool outside(const Chunk& chunk, const glm::dmat4& to_clip) {
     out[4] += p.w < 0;
   }
   return std::any_of(out.begin(), out.end(), [](int n) { return n == 8; });
+}
+
+// RGBA, bottom row first.
+std::vector<std::uint8_t> read_pixels(const gles::Target& target) {
+  std::vector<std::uint8_t> rgba(std::size_t{target.width()} * target.height() * 4);
+  target.bind();
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, static_cast<GLsizei>(target.width()), static_cast<GLsizei>(target.height()), GL_RGBA,
+               GL_UNSIGNED_BYTE, rgba.data());
+  return rgba;
 }
 
 glm::dmat4 world_to_clip(const SceneModel& scene, const View& view, bool reversed) {
@@ -151,7 +160,7 @@ void GlesRenderer::State::set_frame_uniforms(gles::Program& program, const Scene
   glUniform4fv(program.at("u_levels"), static_cast<GLsizei>(kMaxLevels), glm::value_ptr(levels[0]));
   glUniform1i(program.at("u_level_count"), static_cast<GLint>(scene.levels().size()));
   glUniform1ui(program.at("u_patch_count"), scene.patch_count());
-  glUniform1f(program.at("u_q_per_pixel"), scene.q() * static_cast<float>(kSamplesPerAxis));
+  glUniform1f(program.at("u_q_per_pixel"), scene.q() * samples_per_axis);
   glUniform1f(program.at("u_phys_size"), static_cast<float>(shape.phystex_size));
   glUniform1f(program.at("u_chroma_step"), textures.chroma_444() ? 1.0f : 0.5f);
   glUniform1f(program.at("u_view_size"), static_cast<float>(textures.view_size()));
@@ -174,37 +183,23 @@ void GlesRenderer::State::set_blending(const InstanceShape& instance) const {
   }
 }
 
-Result<void> GlesRenderer::State::make_targets(std::uint32_t w, std::uint32_t h) {
-  if (w == width && h == height) return {};
-  const std::uint32_t sw = w * kSamplesPerAxis, sh = h * kSamplesPerAxis;
-  if (w == 0 || h == 0 || sw > largest || sh > largest)
-    return fail(fmt::format("picture of {}x{}: this GL draws at most {} on a side", w, h, largest / kSamplesPerAxis));
-  stats.reset();
-  stats_target.reset();
-  depth_buffer = gles::make_renderbuffer(GL_DEPTH_COMPONENT32F, sw, sh);
-  samples = gles::make_texture(linear ? GL_RGBA16F : GL_RGBA8, sw, sh, GL_NEAREST);
-  samples_target = gles::make_framebuffer();
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, samples.id(), 0);
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_buffer.id());
-  const bool samples_ok = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-  picture = gles::make_texture(GL_RGBA8, w, h, GL_NEAREST);
-  picture_target = gles::make_framebuffer();
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, picture.id(), 0);
-  if (!samples_ok || glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-    return fail("GL: no render target of this size");
-  width = w;
-  height = h;
+Result<void> GlesRenderer::State::fit(gles::Target& target, GLenum format, std::uint32_t width, std::uint32_t height,
+                                      bool with_depth) {
+  if (target.width() == width && target.height() == height) return {};
+  target = gles::Target();  // the old one's memory first
+  auto made = gles::Target::create(format, width, height, with_depth);
+  if (!made) return std::unexpected(made.error());
+  target = std::move(*made);
   return {};
 }
 
-Result<void> GlesRenderer::State::make_stats_target() {
-  if (stats_target) return {};
-  stats = gles::make_texture(GL_RGBA8, width * kSamplesPerAxis, height * kSamplesPerAxis, GL_NEAREST);
-  stats_target = gles::make_framebuffer();
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, stats.id(), 0);
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth_buffer.id());
-  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) return fail("GL: no target for counting");
-  return {};
+Result<void> GlesRenderer::State::make_targets(std::uint32_t width, std::uint32_t height) {
+  const std::uint32_t most = largest / kSamplesPerAxis;
+  if (width == 0 || height == 0 || width > most || height > most)
+    return fail(fmt::format("picture of {}x{}: this GL draws at most {} on a side", width, height, most));
+  const GLenum format = linear ? GL_RGBA16F : GL_RGBA8;
+  if (auto ok = fit(samples, format, width * kSamplesPerAxis, height * kSamplesPerAxis, true); !ok) return ok;
+  return fit(picture, GL_RGBA8, width, height, false);
 }
 
 void GlesRenderer::State::add_chunk(const SceneModel& scene, std::uint32_t index) {
@@ -346,9 +341,10 @@ Result<void> GlesRenderer::State::draw_items(const SceneModel& scene, const View
   return {};
 }
 
-Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View& view, bool stats_pass) {
-  glBindFramebuffer(GL_FRAMEBUFFER, stats_pass ? stats_target.id() : samples_target.id());
-  glViewport(0, 0, static_cast<GLsizei>(width * kSamplesPerAxis), static_cast<GLsizei>(height * kSamplesPerAxis));
+Result<void> GlesRenderer::State::draw_scene(const SceneModel& scene, const View& view, const gles::Target& target,
+                                             bool stats_pass) {
+  target.bind();
+  samples_per_axis = static_cast<float>(target.height()) / static_cast<float>(view.height);
   const bool reversed = clip_control != nullptr;
   if (reversed) clip_control(kLowerLeft, kZeroToOne);
   glDisable(GL_BLEND);
@@ -399,9 +395,12 @@ Result<std::unique_ptr<GlesRenderer>> GlesRenderer::create(const SceneModel& sce
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
   s.largest = static_cast<std::uint32_t>(largest);
-  s.linear = gles::has_extension("GL_EXT_color_buffer_float") || gles::has_extension("GL_EXT_color_buffer_half_float");
-  if (gles::has_extension("GL_EXT_clip_control"))
-    s.clip_control = reinterpret_cast<ClipControl>(eglGetProcAddress("glClipControlEXT"));
+  const bool desktop = gles::is_desktop();
+  s.linear = desktop || gles::has_extension("GL_EXT_color_buffer_float") ||
+             gles::has_extension("GL_EXT_color_buffer_half_float");
+  if (gles::has_extension(desktop ? "GL_ARB_clip_control" : "GL_EXT_clip_control")) {
+    s.clip_control = reinterpret_cast<ClipControl>(eglGetProcAddress(desktop ? "glClipControl" : "glClipControlEXT"));
+  }
   s.empty_array = gles::make_vertex_array();
   const struct {
     std::optional<gles::Program>& program;
@@ -418,26 +417,25 @@ Result<std::unique_ptr<GlesRenderer>> GlesRenderer::create(const SceneModel& sce
   return std::unique_ptr<GlesRenderer>(new GlesRenderer(std::move(state)));
 }
 
-Result<void> GlesRenderer::synchronise(const SceneModel& scene, StreamPlayer& player) {
+Result<void> GlesRenderer::synchronise(const SceneModel& scene, const StreamNews& news) {
   for (auto i = static_cast<std::uint32_t>(state_->chunks.size()); i < scene.chunks().size(); ++i)
     state_->add_chunk(scene, i);
-  return state_->textures.upload(player);
+  return state_->textures.upload(news);
 }
 
-Result<void> GlesRenderer::synchronise_view(const SceneModel& scene, StreamPlayer& player) {
-  return state_->textures.upload_view(player, scene);
+Result<void> GlesRenderer::synchronise_view(const SceneModel& scene, const StreamShape& shape, const StreamNews& news) {
+  return state_->textures.upload_view(news, scene, shape);
 }
 
 Result<void> GlesRenderer::draw(const SceneModel& scene, const View& view) {
   State& s = *state_;
   if (auto ok = s.make_targets(view.width, view.height); !ok) return ok;
-  if (auto ok = s.draw_scene(scene, view, false); !ok) return ok;
-  glBindFramebuffer(GL_FRAMEBUFFER, s.picture_target.id());
-  glViewport(0, 0, static_cast<GLsizei>(s.width), static_cast<GLsizei>(s.height));
+  if (auto ok = s.draw_scene(scene, view, s.samples, false); !ok) return ok;
+  s.picture.bind();
   glDisable(GL_DEPTH_TEST);
   s.resolve->use();
   glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, s.samples.id());
+  glBindTexture(GL_TEXTURE_2D, s.samples.texture());
   glUniform1i(s.resolve->at("u_samples"), 0);
   glBindVertexArray(s.empty_array.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -448,42 +446,43 @@ Result<void> GlesRenderer::draw(const SceneModel& scene, const View& view) {
 }
 
 void GlesRenderer::present(std::uint32_t framebuffer) {
-  const auto w = static_cast<GLint>(state_->width), h = static_cast<GLint>(state_->height);
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, state_->picture_target.id());
+  const gles::Target& picture = state_->picture;
+  const auto w = static_cast<GLint>(picture.width()), h = static_cast<GLint>(picture.height());
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, picture.framebuffer());
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
   glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
 }
 
 Result<Image8> GlesRenderer::read_picture() {
-  const State& s = *state_;
-  if (s.width == 0) return fail("picture: nothing is drawn yet");
-  std::vector<std::uint8_t> rgba(std::size_t{s.width} * s.height * 4);
-  glBindFramebuffer(GL_FRAMEBUFFER, s.picture_target.id());
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, static_cast<GLsizei>(s.width), static_cast<GLsizei>(s.height), GL_RGBA, GL_UNSIGNED_BYTE,
-               rgba.data());
-  Image8 image{s.width, s.height, std::vector<std::uint8_t>(std::size_t{s.width} * s.height * 3)};
-  for (std::uint32_t y = 0; y < s.height; ++y) {
-    const std::uint8_t* from = rgba.data() + std::size_t{s.height - 1 - y} * s.width * 4;
-    std::uint8_t* to = image.rgb.data() + std::size_t{y} * s.width * 3;
-    for (std::uint32_t x = 0; x < s.width; ++x) std::memcpy(to + x * 3, from + x * 4, 3);
+  const gles::Target& picture = state_->picture;
+  const std::uint32_t width = picture.width(), height = picture.height();
+  if (width == 0) return fail("picture: nothing is drawn yet");
+  const auto rgba = read_pixels(picture);
+  Image8 image{width, height, std::vector<std::uint8_t>(std::size_t{width} * height * 3)};
+  for (std::uint32_t y = 0; y < height; ++y) {
+    const std::uint8_t* from = rgba.data() + std::size_t{height - 1 - y} * width * 4;
+    std::uint8_t* to = image.rgb.data() + std::size_t{y} * width * 3;
+    for (std::uint32_t x = 0; x < width; ++x) std::memcpy(to + x * 3, from + x * 4, 3);
   }
   return image;
 }
 
-Result<ResidencyCounts> GlesRenderer::count_residency(const SceneModel& scene, const View& view) {
+Result<ResidencyCounts> GlesRenderer::count_residency(const SceneModel& scene, const View& view,
+                                                      std::uint32_t coarseness) {
   State& s = *state_;
-  if (auto ok = s.make_targets(view.width, view.height); !ok) return std::unexpected(ok.error());
-  if (auto ok = s.make_stats_target(); !ok) return std::unexpected(ok.error());
-  if (auto ok = s.draw_scene(scene, view, true); !ok) return std::unexpected(ok.error());
-  const std::uint32_t sw = s.width * kSamplesPerAxis, sh = s.height * kSamplesPerAxis;
-  std::vector<std::uint8_t> rgba(std::size_t{sw} * sh * 4);
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, static_cast<GLsizei>(sw), static_cast<GLsizei>(sh), GL_RGBA, GL_UNSIGNED_BYTE, rgba.data());
+  const auto side = [&](std::uint32_t pixels) {
+    return coarseness == 0 ? pixels * kSamplesPerAxis : std::max(1u, pixels / coarseness);
+  };
+  const std::uint32_t width = side(view.width), height = side(view.height);
+  if (width == 0 || height == 0 || width > s.largest || height > s.largest)
+    return fail(fmt::format("view of {}x{} is too large to count", view.width, view.height));
+  if (auto ok = s.fit(s.stats, GL_RGBA8, width, height, true); !ok) return std::unexpected(ok.error());
+  if (auto ok = s.draw_scene(scene, view, s.stats, true); !ok) return std::unexpected(ok.error());
+  const auto rgba = read_pixels(s.stats);
   std::array<std::uint64_t, 9> counts{};
   for (std::size_t i = 0; i < rgba.size(); i += 4) ++counts[static_cast<std::size_t>((rgba[i] * 8 + 127) / 255)];
-  return ResidencyCounts{std::uint64_t{sw} * sh, counts[0], counts[1], counts[2], counts[3], counts[4]};
+  return ResidencyCounts{std::uint64_t{width} * height, counts[0], counts[1], counts[2], counts[3], counts[4]};
 }
 
 void GlesRenderer::finish() { glFinish(); }

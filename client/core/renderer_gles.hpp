@@ -14,7 +14,7 @@
 
 namespace darm::client {
 
-/// Where the samples of a picture (4 a pixel) took their light from.
+/// Where the samples of a picture took their light from.
 struct ResidencyCounts {
   std::uint64_t samples = 0;
   std::uint64_t undefined = 0;   ///< no light yet
@@ -24,7 +24,8 @@ struct ResidencyCounts {
   std::uint64_t background = 0;
 };
 
-/// One scene and one stream in one GL context, which must be current at every call, destruction included.
+/// One scene and one stream in one GL context (OpenGL ES 3, or desktop OpenGL 3.3 with texture storage), which must be
+/// current at every call, destruction included.
 /// Unlit triangles, 2x2 samples a pixel, resolved in linear light. Where half-float targets exist, blending is in
 /// linear light too, else on sRGB values.
 class GlesRenderer {
@@ -32,18 +33,28 @@ class GlesRenderer {
   [[nodiscard]] static Result<std::unique_ptr<GlesRenderer>> create(const SceneModel& scene, const StreamShape& shape);
   ~GlesRenderer();
 
-  /// Uploads what came since the last call: chunks, slots, pages, CoarseTex. The scene is that of create().
-  [[nodiscard]] Result<void> synchronise(const SceneModel& scene, StreamPlayer& player);
-  /// The same for the private layer. Once called, pictures show it: linear(shared) + linear(view), and clear surfaces
-  /// pass what is behind by their private tiles.
-  [[nodiscard]] Result<void> synchronise_view(const SceneModel& scene, StreamPlayer& player);
+  /// Uploads what came since the last call: chunks, slots, pages, CoarseTex. The scene is that of create(), or one of
+  /// the same manifest.
+  [[nodiscard]] Result<void> synchronise(const SceneModel& scene, const StreamNews& news);
+  [[nodiscard]] Result<void> synchronise(const SceneModel& scene, StreamPlayer& player) {
+    return synchronise(scene, player.take_news());
+  }
+  /// The same for the private layer, of `shape`. Once called, pictures show it: linear(shared) + linear(view), and
+  /// clear surfaces pass what is behind by their private tiles.
+  [[nodiscard]] Result<void> synchronise_view(const SceneModel& scene, const StreamShape& shape,
+                                              const StreamNews& news);
+  [[nodiscard]] Result<void> synchronise_view(const SceneModel& scene, StreamPlayer& player) {
+    return synchronise_view(scene, player.shape(), player.take_news());
+  }
   /// Draws into a picture of view.width x view.height for read_picture() and present().
   [[nodiscard]] Result<void> draw(const SceneModel& scene, const View& view);
   /// Copies the last picture to a framebuffer (0: the window's) of at least its size.
   void present(std::uint32_t framebuffer);
   [[nodiscard]] Result<Image8> read_picture();
-  /// Draws the view once more to count classes; expensive, for reports.
-  [[nodiscard]] Result<ResidencyCounts> count_residency(const SceneModel& scene, const View& view);
+  /// Draws the view once more to count classes. `coarseness` 0: every sample (4 a pixel), expensive, for reports;
+  /// n: one sample for n x n pixels. The picture stays.
+  [[nodiscard]] Result<ResidencyCounts> count_residency(const SceneModel& scene, const View& view,
+                                                        std::uint32_t coarseness = 0);
   /// Waits until the GL has drawn everything (for timing).
   void finish();
   /// The GL's own name, for reports.

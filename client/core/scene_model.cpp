@@ -39,6 +39,7 @@ Result<SceneModel> SceneModel::from_manifest(const wire::SceneManifest& manifest
   SceneModel model;
   model.limits_ = limits;
   model.scene_hash_ = manifest.scene_hash();
+  model.tag_ = manifest.tag();
   for (const auto step : {&SceneModel::read_levels, &SceneModel::read_patches, &SceneModel::read_instances,
                           &SceneModel::read_surroundings}) {
     if (auto read = (model.*step)(manifest); !read) return std::unexpected(read.error());
@@ -153,7 +154,7 @@ Result<void> SceneModel::read_surroundings(const wire::SceneManifest& manifest) 
   return {};
 }
 
-Result<void> SceneModel::add_chunk(const wire::GeometryChunk& info) {
+Result<Chunk> SceneModel::read_chunk(const wire::GeometryChunk& info) {
   const auto refuse = [&](const char* what) { return fail(fmt::format("geometry chunk {}: {}", info.index(), what)); };
   if (info.index() >= expected_chunks_) return refuse("index is out of range");
   if (chunk_seen_[info.index()]) return refuse("came twice");
@@ -201,9 +202,20 @@ Result<void> SceneModel::add_chunk(const wire::GeometryChunk& info) {
     chunk.high = high;
   }
   geometry_bytes_ += bytes;
-  triangles_ += chunk.indices.size() / 3;
   chunk_seen_[info.index()] = true;
+  ++chunks_read_;
+  return chunk;
+}
+
+void SceneModel::keep_chunk(Chunk chunk) {
+  triangles_ += chunk.indices.size() / 3;
   chunks_.push_back(std::move(chunk));
+}
+
+Result<void> SceneModel::add_chunk(const wire::GeometryChunk& info) {
+  auto chunk = read_chunk(info);
+  if (!chunk) return std::unexpected(chunk.error());
+  keep_chunk(std::move(*chunk));
   return {};
 }
 

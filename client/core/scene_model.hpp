@@ -81,12 +81,20 @@ struct Background {
 };
 
 /// The scene as announced, and the geometry that has come so far. A refused chunk leaves the model as it was.
+/// Where one thread reads and another draws, each has a copy of the announced scene: the one reads chunks, the other
+/// keeps them.
 class SceneModel {
  public:
   [[nodiscard]] static Result<SceneModel> from_manifest(const wire::SceneManifest& manifest,
                                                         const SceneLimits& limits = {});
+  /// Checks and decodes a chunk, and notes that it came.
+  [[nodiscard]] Result<Chunk> read_chunk(const wire::GeometryChunk& chunk);
+  /// `chunk` was read by this model or by one of the same manifest.
+  void keep_chunk(Chunk chunk);
+  /// Both.
   [[nodiscard]] Result<void> add_chunk(const wire::GeometryChunk& chunk);
 
+  [[nodiscard]] bool all_read() const { return chunks_read_ == expected_chunks_; }
   [[nodiscard]] bool complete() const { return chunks_.size() == expected_chunks_; }
   [[nodiscard]] const std::vector<Chunk>& chunks() const { return chunks_; }
   [[nodiscard]] const std::vector<LevelShape>& levels() const { return levels_; }
@@ -103,6 +111,7 @@ class SceneModel {
   [[nodiscard]] bool has_alpha() const { return has_alpha_; }
   [[nodiscard]] bool has_clear() const { return has_clear_; }  ///< some surface shows what is behind it, tinted
   [[nodiscard]] std::uint64_t scene_hash() const { return scene_hash_; }
+  [[nodiscard]] std::uint64_t tag() const { return tag_; }  ///< equal for equal manifest and geometry; 0: none
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }  ///< of the chunks that have come
   /// Level of a tile's page-table entry is known from TileId: level << 28 | index. False if there is no such tile.
   [[nodiscard]] bool page_entry(std::uint32_t tile, std::uint32_t& entry) const;
@@ -123,8 +132,10 @@ class SceneModel {
   std::uint32_t patch_count_ = 0;
   std::uint32_t tile_count_ = 0;
   std::uint32_t expected_chunks_ = 0;
+  std::uint32_t chunks_read_ = 0;
   std::uint64_t geometry_bytes_ = 0;
   std::uint64_t scene_hash_ = 0;
+  std::uint64_t tag_ = 0;
   std::uint64_t triangles_ = 0;
   float q_ = 0;
   glm::dvec3 origin_{0.0};

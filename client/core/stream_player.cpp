@@ -106,18 +106,19 @@ Result<FrameFate> StreamPlayer::apply(const wire::StreamFrame& frame, const Scen
   if (auto ok = check_pixels(frame); !ok) return std::unexpected(ok.error());
   if (!shape_.lossless && (frame.key() || !frame.h264().empty())) {
     if (frame.key()) decoder_.reset();
-    const auto decoded = decoder_.decode(bytes_of(frame.h264()), next_picture_);
+    const auto next = pool_.take();
+    const auto decoded = decoder_.decode(bytes_of(frame.h264()), *next);
     if (!decoded) {
       key_wanted_ = false;  // so that lose_track() resets the decoder
       lose_track();
       return FrameFate::kSkipped;
     }
-    if (next_picture_.width != shape_.phystex_size || next_picture_.height != shape_.phystex_size) {
-      return fail(fmt::format("frame {}: picture is {}x{}, not the size agreed", frame.frame(), next_picture_.width,
-                              next_picture_.height));
+    if (next->width != shape_.phystex_size || next->height != shape_.phystex_size) {
+      return fail(
+          fmt::format("frame {}: picture is {}x{}, not the size agreed", frame.frame(), next->width, next->height));
     }
-    std::swap(picture_, next_picture_);
-    picture_new_ = true;
+    picture_ = next;
+    news_.picture = next;
   }
   commit(frame, std::move(*edits));
   return FrameFate::kApplied;
@@ -125,27 +126,29 @@ Result<FrameFate> StreamPlayer::apply(const wire::StreamFrame& frame, const Scen
 
 void StreamPlayer::commit(const wire::StreamFrame& frame, std::vector<Edit> edits) {
   if (frame.key()) pages_.clear();
+  if (!begun_) news_.fresh = true;
+  begun_ = true;
   for (auto& edit : edits) {
     pages_.set(edit.entry, edit.slot);
     if (edit.slot == kAbsent) continue;
     const bool same_tile = slot_tile_[edit.slot] == edit.entry;
     slot_tile_[edit.slot] = edit.entry;
     if (!edit.through.empty()) {
-      through_[edit.slot] = std::move(edit.through);
+      news_.through[edit.slot] = std::move(edit.through);
       slot_clear_[edit.slot] = true;
     } else if (!same_tile && slot_clear_[edit.slot]) {
-      through_[edit.slot] = std::string(kSlotTexels * 3, '\0');
+      news_.through[edit.slot] = std::string(kSlotTexels * 3, '\0');
       slot_clear_[edit.slot] = false;
     }
     if (!edit.coverage.empty()) {
-      coverage_[edit.slot] = std::move(edit.coverage);
+      news_.coverage[edit.slot] = std::move(edit.coverage);
       slot_masked_[edit.slot] = true;
     } else if (!same_tile && slot_masked_[edit.slot]) {  // coverage is sent once: a tile that stays keeps its own
-      coverage_[edit.slot] = std::string(kSlotTexels, '\xff');
+      news_.coverage[edit.slot] = std::string(kSlotTexels, '\xff');
       slot_masked_[edit.slot] = false;
     }
   }
-  for (const auto& p : frame.pixels()) pixels_[static_cast<std::uint16_t>(p.slot())] = p.rgb();
+  for (const auto& p : frame.pixels()) news_.pixels[static_cast<std::uint16_t>(p.slot())] = p.rgb();
   last_frame_ = frame.frame();
   key_wanted_ = false;
 }
@@ -154,19 +157,27 @@ Result<void> StreamPlayer::apply(const wire::CoarseTexture& coarse, const SceneM
   const auto& level = scene.levels().back();
   if (coarse.width() != level.width || coarse.height() != level.height)
     return fail("coarse texture: size differs from the manifest");
-  Picture picture;
+  auto picture = std::make_shared<Picture>();
   still_decoder_.reset();
-  if (auto ok = still_decoder_.decode(bytes_of(coarse.h264()), picture); !ok)
+  if (auto ok = still_decoder_.decode(bytes_of(coarse.h264()), *picture); !ok)
     return std::unexpected(Error("coarse texture: " + ok.error().message));
-  if (picture.width != level.width || picture.height != level.height)
+  if (picture->width != level.width || picture->height != level.height)
     return fail("coarse texture: picture has another size");
-  coarse_ = std::move(picture);
-  coarse_new_ = true;
+  news_.coarse = std::move(picture);
   has_coarse_ = true;
   return {};
 }
 
-const Picture* StreamPlayer::take_picture() { return std::exchange(picture_new_, false) ? &picture_ : nullptr; }
-const Picture* StreamPlayer::take_coarse() { return std::exchange(coarse_new_, false) ? &coarse_ : nullptr; }
+StreamNews StreamPlayer::take_news() {
+  if (begun_) {
+    for (const auto& rows : pages_.take_dirty_rows()) {
+      for (std::uint32_t row = rows.first; row < rows.first + rows.count; ++row) {
+        const std::uint16_t* slots = pages_.data() + std::size_t{row} * kTableWidth;
+        news_.pages[row].assign(slots, slots + kTableWidth);
+      }
+    }
+  }
+  return std::exchange(news_, {});
+}
 
 }  // namespace darm::client

@@ -7,13 +7,13 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "client/core/page_table.hpp"
+#include "client/core/picture_pool.hpp"
 #include "client/core/result.hpp"
 #include "client/core/scene_model.hpp"
+#include "client/core/stream_news.hpp"
 #include "client/core/video_decoder.hpp"
 #include "proto/darm.pb.h"
 
@@ -53,18 +53,11 @@ class StreamPlayer {
   [[nodiscard]] const PageTable& pages() const { return pages_; }
 
   /// The picture shown now; of a coded stream, once a frame was applied.
-  [[nodiscard]] const Picture& picture() const { return picture_; }
-  /// Newest picture of a coded stream, once per picture; null if there is no newer one.
-  [[nodiscard]] const Picture* take_picture();
-  /// Newest CoarseTex, once per version; null if there is no newer one.
-  [[nodiscard]] const Picture* take_coarse();
+  [[nodiscard]] const Picture& picture() const { return *picture_; }
   [[nodiscard]] bool has_coarse() const { return has_coarse_; }
-  /// Slots rewritten since the last call: lossless RGB (32 * 32 * 3 bytes), and coverage (32 * 32 bytes).
-  using SlotBytes = std::unordered_map<std::uint16_t, std::string>;
-  [[nodiscard]] SlotBytes take_pixels() { return std::exchange(pixels_, {}); }
-  [[nodiscard]] SlotBytes take_coverage() { return std::exchange(coverage_, {}); }
-  /// Of a private layer: what clear surfaces pass, sRGB (32 * 32 * 3 bytes).
-  [[nodiscard]] SlotBytes take_through() { return std::exchange(through_, {}); }
+  /// What came since the last call. Of the frames nothing before the first was applied: until then whoever shows the
+  /// stream keeps what it has, be it of an earlier session.
+  [[nodiscard]] StreamNews take_news();
 
  private:
   struct Edit {
@@ -86,13 +79,13 @@ class StreamPlayer {
   std::vector<std::uint32_t> slot_tile_;  // whose coverage lies in the slot
   std::vector<bool> slot_masked_;         // the slot's coverage is not all 255
   std::vector<bool> slot_clear_;          // the slot's share of what is behind is not all 0
-  Picture picture_, next_picture_, coarse_;
-  SlotBytes pixels_, coverage_, through_;
+  PicturePool pool_;
+  std::shared_ptr<const Picture> picture_ = std::make_shared<Picture>();
+  StreamNews news_;
   std::uint64_t last_frame_ = 0;
   std::uint64_t frames_lost_ = 0;
   bool key_wanted_ = true;
-  bool picture_new_ = false;
-  bool coarse_new_ = false;
+  bool begun_ = false;  // a frame was applied
   bool has_coarse_ = false;
 };
 

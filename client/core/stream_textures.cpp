@@ -16,6 +16,14 @@ void put(const gles::Texture& texture, std::uint32_t x, std::uint32_t y, std::ui
                   static_cast<GLsizei>(height), format, type, data);
 }
 
+// One slot's bytes at its place among `size` pixels.
+void put_slot(const gles::Texture& texture, std::uint32_t size, std::uint16_t slot, GLenum format,
+              const std::string& bytes) {
+  const std::uint32_t per_row = size / kSlotSize;
+  put(texture, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, format, GL_UNSIGNED_BYTE,
+      bytes.data());
+}
+
 gles::Texture plane(std::uint32_t width, std::uint32_t height) {
   return gles::make_texture(GL_R8, width, height, GL_LINEAR);
 }
@@ -54,12 +62,7 @@ Result<StreamTextures> StreamTextures::create(const SceneModel& scene, const Str
   const std::uint32_t page_rows = PageTable(scene.tile_count()).rows();
   if (page_rows > t.largest_) return fail("manifest: the page table is larger than a texture of this GL");
   t.shared_.make(page_rows, shape);
-  const std::uint32_t size = shape.phystex_size;
-  if (scene.has_alpha()) {
-    t.coverage_ = plane(size, size);
-    const std::vector<std::uint8_t> full(std::size_t{size} * size, 255);
-    put(t.coverage_, 0, 0, size, size, GL_RED, GL_UNSIGNED_BYTE, full.data());
-  }
+  if (scene.has_alpha()) t.make_coverage();
   t.coarse_y_ = plane(1, 1);
   t.coarse_cb_ = plane(1, 1);
   t.coarse_cr_ = plane(1, 1);
@@ -69,6 +72,8 @@ Result<StreamTextures> StreamTextures::create(const SceneModel& scene, const Str
 
 void StreamTextures::Slots::make(std::uint32_t page_rows, const StreamShape& shape) {
   pages = gles::make_texture(GL_R16UI, kTableWidth, page_rows, GL_NEAREST);
+  const std::vector<std::uint16_t> none(std::size_t{page_rows} * kTableWidth, kAbsent);
+  put(pages, 0, 0, kTableWidth, page_rows, GL_RED_INTEGER, GL_UNSIGNED_SHORT, none.data());
   size = shape.phystex_size;
   chroma_444 = shape.chroma_444;
   if (shape.lossless) {
@@ -92,17 +97,11 @@ void StreamTextures::Slots::put_picture(const Picture& p) {
   put(cr, 0, 0, p.chroma_width(), p.chroma_height(), GL_RED, GL_UNSIGNED_BYTE, p.cr.data());
 }
 
-void StreamTextures::Slots::upload(StreamPlayer& player) {
-  for (const auto& rows : player.pages().take_dirty_rows()) {
-    put(pages, 0, rows.first, kTableWidth, rows.count, GL_RED_INTEGER, GL_UNSIGNED_SHORT,
-        player.pages().data() + std::size_t{rows.first} * kTableWidth);
-  }
-  const std::uint32_t per_row = size / kSlotSize;
-  for (const auto& [slot, bytes] : player.take_pixels()) {
-    put(y, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, GL_RGB, GL_UNSIGNED_BYTE,
-        bytes.data());
-  }
-  if (const Picture* picture = player.take_picture(); picture != nullptr) put_picture(*picture);
+void StreamTextures::Slots::upload(const StreamNews& news) {
+  for (const auto& [row, slots] : news.pages)
+    put(pages, 0, row, kTableWidth, 1, GL_RED_INTEGER, GL_UNSIGNED_SHORT, slots.data());
+  for (const auto& [slot, bytes] : news.pixels) put_slot(y, size, slot, GL_RGB, bytes);
+  if (news.picture) put_picture(*news.picture);
 }
 
 Result<void> StreamTextures::upload_coarse(const Picture& p) {
@@ -118,48 +117,45 @@ Result<void> StreamTextures::upload_coarse(const Picture& p) {
   return {};
 }
 
-void StreamTextures::upload_coverage(StreamPlayer& player) {
-  const std::uint32_t per_row = shape_.slots_per_row();
-  const auto coverage = player.take_coverage();
-  if (!coverage_) return;
-  for (const auto& [slot, bytes] : coverage) {
-    put(coverage_, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, GL_RED,
-        GL_UNSIGNED_BYTE, bytes.data());
-  }
+void StreamTextures::make_coverage() {
+  const std::uint32_t size = shape_.phystex_size;
+  coverage_ = plane(size, size);
+  const std::vector<std::uint8_t> full(std::size_t{size} * size, 255);
+  put(coverage_, 0, 0, size, size, GL_RED, GL_UNSIGNED_BYTE, full.data());
 }
 
-Result<void> StreamTextures::upload(StreamPlayer& player) {
+void StreamTextures::make_through() {
+  const std::uint32_t size = view_.size;
+  through_ = gles::make_texture(GL_RGB8, size, size, GL_LINEAR);
+  const std::vector<std::uint8_t> none(std::size_t{size} * size * 3, 0);
+  put(through_, 0, 0, size, size, GL_RGB, GL_UNSIGNED_BYTE, none.data());
+}
+
+Result<void> StreamTextures::upload(const StreamNews& news) {
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glActiveTexture(GL_TEXTURE0);
-  shared_.upload(player);
-  upload_coverage(player);
-  if (const Picture* coarse = player.take_coarse(); coarse != nullptr) {
-    if (auto ok = upload_coarse(*coarse); !ok) return ok;
+  shared_.upload(news);
+  if (coverage_) {
+    if (news.fresh) make_coverage();
+    for (const auto& [slot, bytes] : news.coverage) put_slot(coverage_, shape_.phystex_size, slot, GL_RED, bytes);
+  }
+  if (news.coarse) {
+    if (auto ok = upload_coarse(*news.coarse); !ok) return ok;
   }
   if (glGetError() != GL_NO_ERROR) return fail("GL: an upload failed");
   return {};
 }
 
-Result<void> StreamTextures::upload_view(StreamPlayer& player, const SceneModel& scene) {
+Result<void> StreamTextures::upload_view(const StreamNews& news, const SceneModel& scene, const StreamShape& shape) {
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glActiveTexture(GL_TEXTURE0);
-  if (!has_view()) {
-    view_.make(player.pages().rows(), player.shape());
-    const std::uint32_t size = view_.size;
-    if (scene.has_clear()) {
-      through_ = gles::make_texture(GL_RGB8, size, size, GL_LINEAR);
-      const std::vector<std::uint8_t> none(std::size_t{size} * size * 3, 0);
-      put(through_, 0, 0, size, size, GL_RGB, GL_UNSIGNED_BYTE, none.data());
-    }
+  const bool first = !has_view();
+  if (first) view_.make(PageTable(scene.tile_count()).rows(), shape);
+  if (scene.has_clear() && (first || news.fresh)) make_through();
+  view_.upload(news);  // coverage is the shared layer's
+  if (through_) {
+    for (const auto& [slot, bytes] : news.through) put_slot(through_, view_.size, slot, GL_RGB, bytes);
   }
-  view_.upload(player);
-  static_cast<void>(player.take_coverage());  // coverage is the shared layer's
-  const std::uint32_t per_row = view_.size / kSlotSize;
-  const auto through = player.take_through();
-  if (through_)
-    for (const auto& [slot, bytes] : through)
-      put(through_, slot % per_row * kSlotSize, slot / per_row * kSlotSize, kSlotSize, kSlotSize, GL_RGB,
-          GL_UNSIGNED_BYTE, bytes.data());
   if (glGetError() != GL_NO_ERROR) return fail("GL: an upload of the private layer failed");
   return {};
 }

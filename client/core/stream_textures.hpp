@@ -3,6 +3,7 @@
 
 #include "client/core/gles_resources.hpp"
 #include "client/core/scene_model.hpp"
+#include "client/core/stream_news.hpp"
 #include "client/core/stream_player.hpp"
 
 namespace darm::client {
@@ -29,10 +30,9 @@ enum TextureUnit : int {
 class StreamTextures {
  public:
   [[nodiscard]] static Result<StreamTextures> create(const SceneModel& scene, const StreamShape& shape);
-  /// Uploads what the player has new.
-  [[nodiscard]] Result<void> upload(StreamPlayer& player);
-  /// The same of the private layer; makes its textures at the first call.
-  [[nodiscard]] Result<void> upload_view(StreamPlayer& player, const SceneModel& scene);
+  [[nodiscard]] Result<void> upload(const StreamNews& news);
+  /// The same of the private layer; makes its textures, of `shape`, at the first call.
+  [[nodiscard]] Result<void> upload_view(const StreamNews& news, const SceneModel& scene, const StreamShape& shape);
   [[nodiscard]] bool has_view() const { return static_cast<bool>(view_.pages); }
   [[nodiscard]] std::uint32_t view_size() const { return view_.size; }
   [[nodiscard]] bool view_444() const { return view_.chroma_444; }
@@ -48,10 +48,11 @@ class StreamTextures {
     bool chroma_444 = false;
     gles::Texture pages, y, cb, cr;
     void make(std::uint32_t page_rows, const StreamShape& shape);
-    void upload(StreamPlayer& player);
+    void upload(const StreamNews& news);
     void put_picture(const Picture& picture);
   };
-  void upload_coverage(StreamPlayer& player);
+  void make_coverage();
+  void make_through();
   [[nodiscard]] Result<void> upload_coarse(const Picture& picture);
 
   StreamShape shape_;

@@ -46,13 +46,12 @@ struct Client {
     if (e.has_geometry() && scene) (void)scene->add_chunk(e.geometry());
     if (view_player && e.has_view_frame()) {
       (void)view_player->apply(e.view_frame(), *scene);
-      (void)view_player->pages().take_dirty_rows();
-      (void)view_player->take_through();
+      (void)view_player->take_news();
     }
     if (!player) return;
     if (e.has_frame()) (void)player->apply(e.frame(), *scene);
     if (e.has_coarse()) (void)player->apply(e.coarse(), *scene);
-    (void)player->pages().take_dirty_rows();
+    (void)player->take_news();
   }
 };
 

@@ -121,5 +121,19 @@ TEST(View, TargetLandsInTheMiddleOfThePicture) {
   EXPECT_GT(clip.w, 0);
 }
 
+TEST(SceneModel, OneModelReadsWhatAnotherKeeps) {
+  auto reader = SceneModel::from_manifest(synthetic::manifest());
+  ASSERT_TRUE(reader);
+  SceneModel keeper = *reader;
+  auto chunk = reader->read_chunk(synthetic::square_chunk());
+  ASSERT_TRUE(chunk);
+  EXPECT_TRUE(reader->all_read());
+  EXPECT_FALSE(reader->complete()) << "it keeps nothing";
+  EXPECT_FALSE(reader->read_chunk(synthetic::square_chunk())) << "twice";
+  keeper.keep_chunk(std::move(*chunk));
+  EXPECT_TRUE(keeper.complete());
+  EXPECT_EQ(keeper.triangles(), 2u);
+}
+
 }  // namespace
 }  // namespace darm::client

@@ -86,19 +86,35 @@ TEST_F(Player, AppliesPictureAndPagesTogetherOrNeither) {
   EXPECT_EQ(apply(first), FrameFate::kApplied);
   EXPECT_FALSE(player_->key_frame_wanted());
   EXPECT_EQ(apply(second), FrameFate::kApplied);
-  ASSERT_NE(player_->take_picture(), nullptr);
+  ASSERT_NE(player_->take_news().picture, nullptr);
   // 7 is lost: 8 brings neither picture nor pages.
   EXPECT_EQ(apply(fourth), FrameFate::kSkipped);
   EXPECT_TRUE(player_->key_frame_wanted());
   EXPECT_EQ(player_->pages().slot(0), 2);
-  EXPECT_EQ(player_->take_picture(), nullptr);
+  EXPECT_TRUE(player_->take_news().empty());
   EXPECT_EQ(apply(third), FrameFate::kSkipped) << "too late";
   EXPECT_EQ(apply(frame(9, true, 9)), FrameFate::kApplied);
   EXPECT_EQ(player_->pages().slot(0), 9);
-  const Picture* picture = player_->take_picture();
+  const auto picture = player_->take_news().picture;
   ASSERT_NE(picture, nullptr);
   EXPECT_NEAR(picture->y[1000], 140, 3);
   EXPECT_EQ(player_->frame_shown(), 9u);
+}
+
+TEST_F(Player, NewsAreNoneBeforeTheFirstFrameAndTheFirstSaySo) {
+  open(false);
+  EXPECT_TRUE(player_->take_news().empty()) << "whoever shows the stream keeps what an earlier session left";
+  EXPECT_EQ(apply(frame(3, false, 3)), FrameFate::kSkipped);
+  EXPECT_TRUE(player_->take_news().empty());
+  apply(frame(4, true, 1));
+  const auto first = player_->take_news();
+  EXPECT_TRUE(first.fresh);
+  ASSERT_EQ(first.pages.size(), player_->pages().rows()) << "the whole table";
+  EXPECT_EQ(first.pages.at(0)[0], 1);
+  apply(frame(5, false, 2));
+  const auto second = player_->take_news();
+  EXPECT_FALSE(second.fresh);
+  EXPECT_EQ(second.pages.at(0)[0], 2);
 }
 
 TEST_F(Player, DamagedPictureAsksForAKeyFrame) {
@@ -117,7 +133,7 @@ TEST_F(Player, KeyFrameReplacesTheWholeTable) {
   open(true);
   apply(synthetic::key_frame([](auto, int, int) { return synthetic::Colour{1, 2, 3}; }, 0, 2));
   EXPECT_EQ(player_->pages().resident(), 14u);
-  EXPECT_EQ(player_->take_pixels().size(), 14u);
+  EXPECT_EQ(player_->take_news().pixels.size(), 14u);
   wire::StreamFrame key;
   key.set_frame(9);
   key.set_key(true);
@@ -169,13 +185,13 @@ TEST_F(Player, CoverageStaysWithATileAndLeavesWithIt) {
   packed.resize(size);
   f.mutable_page_edits(0)->set_coverage(packed);
   apply(f);
-  EXPECT_EQ(player_->take_coverage()[3], plain);
+  EXPECT_EQ(player_->take_news().coverage[3], plain);
   f.mutable_page_edits(0)->clear_coverage();  // sent once: the next key frame names the same tile without it
   apply(f);
-  EXPECT_TRUE(player_->take_coverage().empty());
+  EXPECT_TRUE(player_->take_news().coverage.empty());
   f.mutable_page_edits(0)->set_tile(0);  // another tile, opaque, in the same slot
   apply(f);
-  EXPECT_EQ(player_->take_coverage()[3], std::string(1024, '\xff'));
+  EXPECT_EQ(player_->take_news().coverage[3], std::string(1024, '\xff'));
   f.mutable_page_edits(0)->set_coverage(packed.substr(0, size / 2));
   EXPECT_FALSE(player_->apply(f, *scene_)) << "a cut stream is no coverage";
 }
@@ -190,7 +206,7 @@ TEST_F(Player, CoarseTexMustHaveTheSizeOfItsLevel) {
   const auto ok = player_->apply(coarse, *scene_);
   ASSERT_TRUE(ok) << ok.error().message;
   EXPECT_TRUE(player_->has_coarse());
-  const Picture* picture = player_->take_coarse();
+  const auto picture = player_->take_news().coarse;
   ASSERT_NE(picture, nullptr);
   EXPECT_NEAR(picture->y[450], 99, 3);
   coarse.set_width(60);
@@ -243,17 +259,17 @@ TEST_F(Player, RefusesAShareOfWhatIsBehindThatIsNoTileAndKeepsItWithTheTile) {
   for (const auto& bad : {std::string("junk"), packed(3071), packed(1024), packed(5000)}) {
     f.mutable_page_edits(0)->set_through(bad);
     EXPECT_FALSE(player_->apply(f, *scene_));
-    EXPECT_TRUE(player_->take_through().empty());
+    EXPECT_TRUE(player_->take_news().through.empty());
   }
   f.mutable_page_edits(0)->set_through(packed(3072));
   EXPECT_EQ(apply(f), FrameFate::kApplied);
-  EXPECT_EQ(player_->take_through().at(3).size(), 3072u);
+  EXPECT_EQ(player_->take_news().through.at(3).size(), 3072u);
   f.mutable_page_edits(0)->clear_through();  // the tile stays: so does what came with it
   EXPECT_EQ(apply(f), FrameFate::kApplied);
-  EXPECT_TRUE(player_->take_through().empty());
+  EXPECT_TRUE(player_->take_news().through.empty());
   f.mutable_page_edits(0)->set_tile(1u << 28);  // another tile, opaque
   EXPECT_EQ(apply(f), FrameFate::kApplied);
-  EXPECT_EQ(player_->take_through().at(3), std::string(3072, '\0'));
+  EXPECT_EQ(player_->take_news().through.at(3), std::string(3072, '\0'));
 }
 
 }  // namespace
