@@ -1,10 +1,7 @@
 #include "client/core/connection.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <netdb.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -23,6 +20,7 @@
 #include <thread>
 #include <utility>
 
+#include "client/core/byte_stream.hpp"
 #include "proto/datagram.hpp"
 #include "proto/framing.hpp"
 #include "proto/limits.hpp"
@@ -32,71 +30,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
-
-struct AddressList {
-  addrinfo* list = nullptr;
-  ~AddressList() {
-    if (list != nullptr) ::freeaddrinfo(list);
-  }
-};
-
 std::string errno_text() { return std::strerror(errno); }
-
-bool wait_for(int fd, short events, milliseconds timeout) {
-  pollfd p{fd, events, 0};
-  return ::poll(&p, 1, static_cast<int>(timeout.count())) > 0;
-}
-
-// Connects without blocking longer than `timeout`; leaves the socket non-blocking.
-Result<Descriptor> connect_to(const std::string& host, std::uint16_t port, milliseconds timeout) {
-  const std::string where = fmt::format("{}:{}", host, port);
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  AddressList found;
-  if (const int code = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found.list); code != 0) {
-    return fail(where + ": " + ::gai_strerror(code));
-  }
-  std::string reason = "no address";
-  for (const addrinfo* a = found.list; a != nullptr; a = a->ai_next) {
-    Descriptor fd(::socket(a->ai_family, a->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, a->ai_protocol));
-    if (fd.get() < 0) continue;
-    if (::connect(fd.get(), a->ai_addr, a->ai_addrlen) != 0 && errno != EINPROGRESS) {
-      reason = errno_text();
-      continue;
-    }
-    if (!wait_for(fd.get(), POLLOUT, timeout)) {
-      reason = "no answer in time";
-      continue;
-    }
-    int code = 0;
-    socklen_t size = sizeof(code);
-    ::getsockopt(fd.get(), SOL_SOCKET, SO_ERROR, &code, &size);
-    if (code != 0) {
-      reason = std::strerror(code);
-      continue;
-    }
-    const int on = 1;
-    ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-    return fd;
-  }
-  return fail(where + ": " + reason + "; is darmd serve running there?");
-}
 
 // UDP to the peer of a TCP socket, at another port.
 Descriptor udp_beside(int tcp, std::uint32_t port) {
@@ -112,13 +46,30 @@ Descriptor udp_beside(int tcp, std::uint32_t port) {
   return fd;
 }
 
-std::string goodbye_text(const wire::Goodbye& g) {
+Cause cause_of(wire::Goodbye::Reason reason) {
+  switch (reason) {
+    case wire::Goodbye::SERVER_FULL:
+      return Cause::kFull;
+    case wire::Goodbye::VERSION_UNSUPPORTED:
+      return Cause::kVersion;
+    case wire::Goodbye::FORMAT_REFUSED:
+      return Cause::kRefused;
+    case wire::Goodbye::PROTOCOL_ERROR:
+      return Cause::kProtocol;
+    default:
+      return Cause::kOther;
+  }
+}
+
+Error farewell(const wire::Goodbye& g) {
   std::string reason = wire::Goodbye::Reason_Name(g.reason());
   if (reason.empty()) reason = "UNSPECIFIED";
   std::string text = g.text().substr(0, proto::kMaxGoodbyeText);
   std::replace_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32; }, ' ');
-  return "the server says goodbye: " + reason + (text.empty() ? "" : " (" + text + ")");
+  return Error("the server says goodbye: " + reason + (text.empty() ? "" : " (" + text + ")"), cause_of(g.reason()));
 }
+
+Error protocol_fault(std::string text) { return Error("server: " + std::move(text), Cause::kProtocol); }
 
 }  // namespace
 
@@ -128,7 +79,8 @@ std::int64_t now_us() {
 
 struct Connection::State {
   ConnectOptions options;
-  Descriptor tcp, udp, wake;
+  std::unique_ptr<ByteStream> tcp;
+  Descriptor udp, wake;
   wire::Welcome welcome;
   std::optional<proto::SipKey> key;
   std::uint64_t datagram_sequence = 0;
@@ -141,7 +93,7 @@ struct Connection::State {
   std::deque<Received> queue;
   std::size_t queued_bytes = 0;
   bool ended = false;
-  std::string end_reason;
+  Error end_reason{"connection is closed"};
 
   std::atomic<std::uint64_t> received{0}, sent{0};
   std::atomic<std::int64_t> last_sent_us{0};
@@ -151,29 +103,16 @@ struct Connection::State {
   Result<void> send_tcp(const wire::Envelope& envelope);
   Result<void> send_body(wire::DatagramBody body);
   void read_loop();
-  std::string read_some(proto::FrameReader& frames);
+  Result<void> read_some(proto::FrameReader& frames);
   bool take(Received message);
   void keep_alive();
-  void end(std::string reason);
+  void end(Error reason);
 };
 
 Result<void> Connection::State::send_tcp(const wire::Envelope& envelope) {
   const auto bytes = proto::frame(envelope);
   const std::lock_guard lock(send_mutex);
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const auto n = ::send(tcp.get(), bytes.data() + done, bytes.size() - done, MSG_NOSIGNAL);
-    if (n > 0) {
-      done += static_cast<std::size_t>(n);
-    } else if (n < 0 && errno == EINTR) {
-      continue;
-    } else if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
-      // Half a message must not stay behind, so a full socket is waited for, but not for ever.
-      if (!wait_for(tcp.get(), POLLOUT, options.connect_timeout)) return fail("server: takes no more data");
-    } else {
-      return fail("server: connection lost: " + errno_text());
-    }
-  }
+  if (auto ok = tcp->send(bytes, options.connect_timeout); !ok) return ok;
   sent += bytes.size();
   last_sent_us = now_us();
   return {};
@@ -193,7 +132,7 @@ Result<void> Connection::State::send_body(wire::DatagramBody body) {
   return send_tcp(envelope);
 }
 
-void Connection::State::end(std::string reason) {
+void Connection::State::end(Error reason) {
   const std::lock_guard lock(mutex);
   if (!ended) end_reason = std::move(reason);
   ended = true;
@@ -209,7 +148,7 @@ bool Connection::State::take(Received message) {
     return send_tcp(pong).has_value();
   }
   if (message.envelope.has_goodbye()) {
-    end(goodbye_text(message.envelope.goodbye()));
+    end(farewell(message.envelope.goodbye()));
     return false;
   }
   std::unique_lock lock(mutex);
@@ -227,27 +166,26 @@ void Connection::State::keep_alive() {
   if (now_us() - last_sent_us < (proto::kPingEverySeconds - 2) * 1'000'000) return;
   wire::Envelope ping;
   ping.mutable_ping()->set_time_us(now_us());
-  if (auto ok = send_tcp(ping); !ok) end(ok.error().message);
+  if (auto ok = send_tcp(ping); !ok) end(ok.error());
 }
 
-// Reads what is there and queues whole messages; a reason to end, or empty.
-std::string Connection::State::read_some(proto::FrameReader& frames) {
+// Reads what is there and queues whole messages; an error is the reason to end.
+Result<void> Connection::State::read_some(proto::FrameReader& frames) {
   std::array<std::uint8_t, 65536> buffer;
-  const auto n = ::recv(tcp.get(), buffer.data(), buffer.size(), 0);
-  if (n == 0) return "server: closed the connection";
-  if (n < 0) return errno == EAGAIN || errno == EINTR ? "" : "server: connection lost: " + errno_text();
-  received += static_cast<std::uint64_t>(n);
-  frames.feed(std::span(buffer.data(), static_cast<std::size_t>(n)));
+  const auto n = tcp->receive(buffer);
+  if (!n) return std::unexpected(n.error());
+  received += *n;
+  frames.feed(std::span(buffer.data(), *n));
   for (;;) {
     Received message;
     const std::size_t before = frames.buffered();
     const auto got = frames.next(message.envelope);
-    if (!got) return "server: " + got.error();
+    if (!got) return std::unexpected(protocol_fault(got.error()));
     if (!*got) return {};
     message.bytes = before - frames.buffered();
     message.bytes_total = received - frames.buffered();
     message.at_us = now_us();
-    if (!take(std::move(message))) return "connection is closed";
+    if (!take(std::move(message))) return fail("connection is closed");
   }
 }
 
@@ -255,30 +193,27 @@ void Connection::State::read_loop() {
   proto::FrameReader frames(proto::kMaxServerEnvelope);
   std::int64_t last_heard = now_us();
   while (!stopping) {
-    std::array<pollfd, 2> fds{{{tcp.get(), POLLIN, 0}, {wake.get(), POLLIN, 0}}};
-    const int ready = ::poll(fds.data(), fds.size(), 500);
+    std::array<pollfd, 2> fds{{{tcp->socket(), POLLIN, 0}, {wake.get(), POLLIN, 0}}};
+    const bool held = tcp->holds_bytes();
+    const int ready = ::poll(fds.data(), fds.size(), held ? 0 : 500);
     if (stopping) break;
-    if (ready < 0 && errno != EINTR) return end("poll: " + errno_text());
-    if (fds[0].revents != 0) {
-      if (auto reason = read_some(frames); !reason.empty()) return end(std::move(reason));
+    if (ready < 0 && errno != EINTR) return end(Error("poll: " + errno_text()));
+    if (held || fds[0].revents != 0) {
+      if (auto ok = read_some(frames); !ok) return end(ok.error());
       last_heard = now_us();
     } else if (now_us() - last_heard > options.silence_timeout.count() * 1000) {
-      return end("server: silent for too long");
+      return end(Error("server: silent for too long"));
     }
     keep_alive();
   }
-  end("connection is closed");
+  end(Error("connection is closed"));
 }
 
 Connection::Connection(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
-Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& options) {
-  auto tcp = connect_to(options.host, options.port, options.connect_timeout);
-  if (!tcp) return std::unexpected(tcp.error());
-  auto state = std::make_unique<State>();
-  state->options = options;
-  state->tcp = std::move(*tcp);
-  state->wake = Descriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+namespace {
+
+wire::Envelope hello_of(const ConnectOptions& options) {
   wire::Envelope envelope;
   auto& hello = *envelope.mutable_hello();
   hello.set_version(proto::kProtocolVersion);
@@ -289,24 +224,55 @@ Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& optio
   hello.set_lossless(options.lossless);
   hello.set_max_view_phystex(options.max_view_phystex);
   hello.set_target_error(options.target_error);
+  hello.set_known_scene(options.known_scene);
+  return envelope;
+}
+
+// The server's first message, or why there is none.
+Result<wire::Welcome> await_welcome(Connection& connection, const ConnectOptions& options) {
+  constexpr milliseconds kSlice{50};
+  std::optional<Received> first;
+  for (auto left = options.handshake_timeout; !first; left -= kSlice) {
+    if (options.stop.stop_requested()) return fail("connection is closed");
+    if (left.count() <= 0) return fail("server: no welcome in time");
+    auto got = connection.next(std::min(left, kSlice));
+    if (!got) return std::unexpected(got.error());
+    first = std::move(*got);
+  }
+  if (!first->envelope.has_welcome()) return std::unexpected(protocol_fault("its first message is not a welcome"));
+  const wire::Welcome& welcome = first->envelope.welcome();
+  if (welcome.version() != proto::kProtocolVersion)
+    return fail(
+        fmt::format("server: speaks protocol version {}, this client {}", welcome.version(), proto::kProtocolVersion),
+        Cause::kVersion);
+  if (welcome.view_phystex() > options.max_view_phystex)
+    return std::unexpected(protocol_fault(fmt::format("offers a private layer of {} pixels, asked for was {}",
+                                                      welcome.view_phystex(), options.max_view_phystex)));
+  return welcome;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& options) {
+  auto tcp = ByteStream::open(
+      {options.host, options.port, options.tls, options.authority, options.connect_timeout, options.stop});
+  if (!tcp) return std::unexpected(tcp.error());
+  auto state = std::make_unique<State>();
+  state->options = options;
+  state->tcp = std::move(*tcp);
+  state->wake = Descriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  const wire::Envelope envelope = hello_of(options);
   if (auto ok = state->send_tcp(envelope); !ok) return std::unexpected(ok.error());
   std::unique_ptr<Connection> connection(new Connection(std::move(state)));
   State& s = *connection->state_;
   s.reader = std::thread([&s] { s.read_loop(); });
 
-  auto first = connection->next(options.handshake_timeout);
-  if (!first) return std::unexpected(first.error());
-  if (!*first) return fail("server: no welcome in time");
-  if (!(*first)->envelope.has_welcome()) return fail("server: its first message is not a welcome");
-  s.welcome = (*first)->envelope.welcome();
-  if (s.welcome.version() != proto::kProtocolVersion)
-    return fail(fmt::format("server: speaks protocol version {}, this client {}", s.welcome.version(),
-                            proto::kProtocolVersion));
-  if (s.welcome.view_phystex() > options.max_view_phystex)
-    return fail(fmt::format("server: offers a private layer of {} pixels, asked for was {}", s.welcome.view_phystex(),
-                            options.max_view_phystex));
+  auto welcome = await_welcome(*connection, options);
+  if (!welcome) return std::unexpected(welcome.error());
+  s.welcome = std::move(*welcome);
   s.key = proto::datagram_key(s.welcome.key());
-  if (s.key) s.udp = udp_beside(s.tcp.get(), s.welcome.udp_port());
+  // Datagrams are authenticated, not encrypted: who asked for TLS gets it for all.
+  if (s.key && options.tls == Tls::kNone) s.udp = udp_beside(s.tcp->socket(), s.welcome.udp_port());
   return connection;
 }
 
@@ -338,7 +304,7 @@ Result<std::optional<Received>> Connection::next(milliseconds timeout) {
     s.changed.notify_all();
     return message;
   }
-  if (s.ended) return fail(s.end_reason);
+  if (s.ended) return std::unexpected(s.end_reason);
   return std::optional<Received>();
 }
 
@@ -371,7 +337,7 @@ void Connection::goodbye() {
   }
   wire::Envelope envelope;
   envelope.mutable_goodbye()->set_reason(wire::Goodbye::CLIENT_LEAVES);
-  if (state_->send_tcp(envelope)) ::shutdown(state_->tcp.get(), SHUT_WR);
+  if (state_->send_tcp(envelope)) state_->tcp->finish();
 }
 
 Result<void> parse_address(const std::string& text, std::string& host, std::uint16_t& port) {

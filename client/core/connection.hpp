@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 
+#include "client/core/byte_stream.hpp"
 #include "client/core/result.hpp"
 #include "client/core/view.hpp"
 #include "proto/darm.pb.h"
@@ -21,6 +23,8 @@ using Clock = std::chrono::steady_clock;
 struct ConnectOptions {
   std::string host;
   std::uint16_t port = 0;
+  Tls tls = Tls::kNone;
+  std::filesystem::path authority;  ///< PEM, for Tls::kVerified; empty: the system's alone
   std::string name = "darm client";
   std::optional<View> view;  ///< geometry comes nearest to it first
   std::uint32_t max_phystex = 2048;
@@ -28,6 +32,8 @@ struct ConnectOptions {
   bool lossless = false;
   float target_error = 0;                 ///< RMS display error with which it is content, 0..1; 0: the server's own
   std::uint32_t max_view_phystex = 1024;  ///< of the private layer; 0: light that does not depend on the eye alone
+  std::uint64_t known_scene = 0;          ///< tag of a scene it has whole, manifest and geometry; 0: none
+  std::stop_token stop;                   ///< ends opening early, with an error
   std::chrono::milliseconds connect_timeout{5000};
   std::chrono::milliseconds handshake_timeout{20000};
   /// Nothing at all from the server for so long: it is taken for gone.
@@ -44,8 +50,8 @@ struct Received {
   std::size_t bytes = 0;          ///< of this message
 };
 
-/// A session with a server. One reader thread inside; the methods may be called from any thread. Pings are answered
-/// and, when the owner sends nothing, sent from inside. The destructor says goodbye and joins.
+/// A session with a server, over TCP or TLS. One reader thread inside; the methods may be called from any thread. Pings
+/// are answered and, when the owner sends nothing, sent from inside. The destructor says goodbye and joins.
 class Connection {
  public:
   [[nodiscard]] static Result<std::unique_ptr<Connection>> open(const ConnectOptions& options);
@@ -55,7 +61,7 @@ class Connection {
 
   [[nodiscard]] const wire::Welcome& welcome() const;
   /// Next message (never Ping, Pong or Welcome); nullopt after `timeout`. Error once the queue is empty and the
-  /// connection has ended: the server's goodbye, its silence, a broken stream.
+  /// connection has ended: the server's goodbye (whose reason is its cause), its silence, a broken stream.
   [[nodiscard]] Result<std::optional<Received>> next(std::chrono::milliseconds timeout);
   /// Sends a camera; gives its sequence number (1, 2, ...), by which answers refer to it.
   [[nodiscard]] Result<std::uint64_t> send_camera(const View& view);

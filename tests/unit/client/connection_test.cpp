@@ -184,6 +184,27 @@ TEST(Connection, GoodbyeOfTheServerIsTheError) {
   ASSERT_FALSE(connection);
   EXPECT_NE(connection.error().message.find("SERVER_FULL"), std::string::npos) << connection.error().message;
   EXPECT_EQ(connection.error().message.find('\n'), std::string::npos);
+  EXPECT_EQ(connection.error().cause, Cause::kFull);
+}
+
+TEST(Connection, NamesTheSceneItHasAndCanBeStoppedWhileItWaits) {
+  FakeServer server([](Peer& peer) {
+    EXPECT_EQ(peer.read().hello().known_scene(), 0x1234567890abcdefu);
+    peer.read();  // says nothing, until the client goes
+  });
+  auto options = to(server.port);
+  options.known_scene = 0x1234567890abcdefu;
+  options.handshake_timeout = 60s;
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  std::thread impatient([&] {
+    std::this_thread::sleep_for(100ms);
+    stop.request_stop();
+  });
+  const auto begin = Clock::now();
+  EXPECT_FALSE(Connection::open(options));
+  EXPECT_LT(Clock::now() - begin, 10s);
+  impatient.join();
 }
 
 TEST(Connection, HostileLengthsAndGarbageEndIt) {
