@@ -34,6 +34,8 @@ LIBRARIES = {
     r"(boost/)?(asio|beast)\b": r"actors/session/|actors/.*_actor\.|client/|daemon/[^/]*$",
     r"boost/beast": r"actors/session/web_listener\.cpp",
     r"openssl/": r"actors/session/(self_signed|tls_context)\.cpp|client/core/byte_stream\.cpp",
+    r"GLFW/": r"client/desktop/(window|controls|overlay)\.cpp",
+    r"imgui|backends/imgui": r"client/desktop/overlay\.cpp",
     r"tiny_?gltf": r"actors/scene/",
     r"embree3/": r"actors/renderer/trace/",
     r"libav(codec|util)/|libswscale/": r"actors/encoder/h264_|client/core/video_decoder|tests/",

@@ -1,0 +1,149 @@
+#include "client/desktop/overlay.hpp"
+
+#include <GLES3/gl3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+namespace darm::client::desktop {
+namespace {
+
+constexpr float kMargin = 10;
+constexpr ImGuiWindowFlags kPlain = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                                    ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                                    ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
+
+constexpr std::array<std::array<const char*, 2>, 11> kHelp = {{{"W A S D, arrows", "walk and turn"},
+                                                               {"Q, E", "down, up"},
+                                                               {"Shift", "hurry"},
+                                                               {"Drag, wheel", "look, go ahead"},
+                                                               {"O", "walk or orbit"},
+                                                               {"P", "measurements"},
+                                                               {"H", "nothing but the scene"},
+                                                               {"L", "copy a link to this view"},
+                                                               {"F12", "save a picture"},
+                                                               {"F11", "full screen"},
+                                                               {"Ctrl Q", "leave"}}};
+
+// A window whose corner (0, 0 the left top, 1, 1 the right bottom) lies there in the screen.
+void place(float x, float y) {
+  const ImVec2 size = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({kMargin + x * (size.x - 2 * kMargin), kMargin + y * (size.y - 2 * kMargin)},
+                          ImGuiCond_Always, {x, y});
+}
+
+template <class Lines>
+void table(const char* name, const Lines& lines) {
+  if (!ImGui::BeginTable(name, 2)) return;
+  for (const auto& [label, value] : lines) {
+    ImGui::TableNextColumn();
+    ImGui::TextUnformatted(&label[0]);
+    ImGui::TableNextColumn();
+    ImGui::TextUnformatted(&value[0]);
+  }
+  ImGui::EndTable();
+}
+
+void buttons(const OverlayShow& show, std::vector<Action>& clicked) {
+  place(0, 0);
+  ImGui::Begin("buttons", nullptr, kPlain | ImGuiWindowFlags_NoBackground);
+  const auto button = [&](const char* label, Action action) {
+    if (ImGui::Button(label)) clicked.push_back(action);
+    ImGui::SameLine();
+  };
+  button(show.mode == Mode::kOrbit ? "Orbit" : "Walk", Action::kMode);
+  button("Link", Action::kLink);
+  button("Numbers", Action::kPanel);
+  button("?", Action::kHelp);
+  ImGui::End();
+}
+
+void words(const Notice& notice) {
+  if (!notice.quiet.empty()) {
+    place(0.5f, 1);
+    ImGui::SetNextWindowBgAlpha(0.7f);
+    ImGui::Begin("notice", nullptr, kPlain | ImGuiWindowFlags_NoInputs);
+    ImGui::TextUnformatted(notice.quiet.c_str());
+    ImGui::End();
+  }
+  if (!notice.alert.empty()) {
+    place(0.5f, 0.5f);
+    ImGui::SetNextWindowBgAlpha(0.9f);
+    ImGui::Begin("alert", nullptr, kPlain | ImGuiWindowFlags_NoInputs);
+    ImGui::PushTextWrapPos(std::max(200.0f, ImGui::GetIO().DisplaySize.x * 0.6f));
+    ImGui::TextUnformatted(notice.alert.c_str());
+    ImGui::PopTextWrapPos();
+    ImGui::End();
+  }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Overlay>> Overlay::create(Window& window) {
+  std::unique_ptr<Overlay> overlay(new Overlay());
+  ImGui::CreateContext();
+  ImGui::StyleColorsDark();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = nullptr;
+  float scale_x = 1, scale_y = 1;
+  glfwGetWindowContentScale(window.handle(), &scale_x, &scale_y);
+  const float scale = std::clamp(scale_x, 1.0f, 4.0f);
+  ImFontConfig font;
+  font.SizePixels = 13 * scale;
+  io.Fonts->AddFontDefault(&font);
+  ImGuiStyle& style = ImGui::GetStyle();
+  style.WindowRounding = style.FrameRounding = 4;
+  style.ScaleAllSizes(scale);
+  overlay->glfw_ = ImGui_ImplGlfw_InitForOpenGL(window.handle(), true);
+  overlay->gl_ =
+      overlay->glfw_ && ImGui_ImplOpenGL3_Init(window.desktop_gl() ? "#version 330 core" : "#version 300 es");
+  if (!overlay->gl_) return fail("overlay: OpenGL's library does not load; install libgl1");
+  return overlay;
+}
+
+Overlay::~Overlay() {
+  if (gl_) ImGui_ImplOpenGL3_Shutdown();
+  if (glfw_) ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext();
+}
+
+bool Overlay::takes_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
+
+std::vector<Action> Overlay::draw(const OverlayShow& show) {
+  std::vector<Action> clicked;
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+  if (!show.bare) {
+    buttons(show, clicked);
+    if (show.panel) {
+      place(1, 0);
+      ImGui::SetNextWindowBgAlpha(0.7f);
+      ImGui::Begin("panel", nullptr, kPlain);
+      table("lines", show.lines);
+      ImGui::End();
+    }
+    if (show.help) {
+      place(0, 1);
+      ImGui::SetNextWindowBgAlpha(0.7f);
+      ImGui::Begin("help", nullptr, kPlain | ImGuiWindowFlags_NoInputs);
+      table("keys", kHelp);
+      ImGui::End();
+    }
+  }
+  words(show.bare ? Notice{"", show.notice.alert} : show.notice);
+  ImGui::Render();
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  // The backend asks for state that OpenGL ES does not have.
+  while (glGetError() != GL_NO_ERROR) {
+  }
+  return clicked;
+}
+
+}  // namespace darm::client::desktop
