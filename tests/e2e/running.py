@@ -18,11 +18,11 @@ SET_UP = SOURCE / "config/scenes/default.toml"
 class Daemon:
     """darmd serve on the default scene, at a low density so that a test takes seconds."""
 
-    def __init__(self, state_dir, *more):
+    def __init__(self, state_dir, *more, q=16, tcp_port=0):
         self.log = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen(
-            [BIN / "darmd", "serve", "--config", SET_UP, "--state-dir", state_dir, "--q", "16", "--address",
-             "127.0.0.1", "--tcp-port", "0", "--udp-port", "0", "--metrics-port", "0", "--http-port", "0",
+            [BIN / "darmd", "serve", "--config", SET_UP, "--state-dir", state_dir, "--q", str(q), "--address",
+             "127.0.0.1", "--tcp-port", str(tcp_port), "--udp-port", "0", "--metrics-port", "0", "--http-port", "0",
              "--allow-lossless", *more],
             stdout=subprocess.PIPE, stderr=self.log, text=True)
         self.ready = self.process.stdout.readline()
