@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what DARM is built from and runs on, on Debian 12. Asks dpkg first and installs only what is missing, so it can
-# be run at any time. With --tests also what tests/run.sh needs; with --list it only prints the packages.
+# be run at any time. With --viewer also what the desktop viewer is built from, with --tests that and what tests/run.sh
+# needs; with --list it only prints the packages.
 set -euo pipefail
 
 build=(
@@ -10,7 +11,8 @@ build=(
   libtomlplusplus-dev libxxhash-dev ninja-build nlohmann-json3-dev pkg-config prometheus-cpp-dev
   protobuf-compiler python3 zlib1g-dev
 )
-tests=(chromium clang-19 clang-format-19 clang-tidy-19 libclang-rt-19-dev libgmock-dev libgtest-dev)
+viewer=(libglfw3-dev libimgui-dev)
+tests=(chromium clang-19 clang-format-19 clang-tidy-19 libclang-rt-19-dev libgmock-dev libgtest-dev xvfb)
 
 # Debian's npm does not get along with a node from elsewhere: what is there is used.
 command -v node >/dev/null || build+=(nodejs)
@@ -20,10 +22,11 @@ packages=("${build[@]}")
 list=false
 for argument in "$@"; do
   case "$argument" in
-    --tests) packages+=("${tests[@]}") ;;
+    --viewer) packages+=("${viewer[@]}") ;;
+    --tests) packages+=("${viewer[@]}" "${tests[@]}") ;;
     --list) list=true ;;
-    -h | --help) sed -n '2,3s/^# //p' "$0"; exit 0 ;;
-    *) echo "install_dependencies.sh: unknown argument $argument; known are --tests, --list" >&2; exit 2 ;;
+    -h | --help) sed -n '2,4s/^# //p' "$0"; exit 0 ;;
+    *) echo "install_dependencies.sh: unknown argument $argument; known are --viewer, --tests, --list" >&2; exit 2 ;;
   esac
 done
 if $list; then
