@@ -1,5 +1,9 @@
 #include "actors/session/asio_connection.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
 #include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/dispatch.hpp>
@@ -9,6 +13,7 @@
 #include <chrono>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace darm::session {
 namespace {
@@ -20,6 +25,8 @@ using boost::system::error_code;
 constexpr std::size_t kReadBytes = 16 * 1024;
 // Small, so that what cannot be sent waits in our queue, where it can be dropped.
 constexpr int kSendBufferBytes = 256 * 1024;
+// What the kernel may hold beyond what is on its way: newer messages wait behind it.
+constexpr int kUnsentBytes = 64 * 1024;
 constexpr std::chrono::seconds kLinger{1};
 
 // Stream: tcp::socket or TlsSocket.
@@ -38,8 +45,8 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
   void read() override {
     on_strand([](AsioConnection& c) { c.start_read(); });
   }
-  void write(Packet packet) override {
-    on_strand([p = std::move(packet)](AsioConnection& c) mutable { c.start_write(std::move(p)); });
+  void write(Packets packets) override {
+    on_strand([p = std::move(packets)](AsioConnection& c) mutable { c.start_write(std::move(p)); });
   }
   void close() override {
     on_strand([](AsioConnection& c) { c.start_close(); });
@@ -81,16 +88,19 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
     owner_.tell(BytesReceived(Bytes(incoming_.begin(), end)));
   }
 
-  void start_write(Packet packet) {
+  void start_write(Packets packets) {
     if (writing_ || closing_ || !socket().is_open()) return;
     writing_ = true;
-    outgoing_ = std::move(packet);
-    const std::array<asio::const_buffer, 3> pieces{
-        asio::buffer(outgoing_.head), outgoing_.body ? asio::buffer(*outgoing_.body) : asio::const_buffer(),
-        asio::buffer(outgoing_.tail)};
+    outgoing_ = std::move(packets);
+    std::vector<asio::const_buffer> pieces;
+    for (const auto& packet : outgoing_) {
+      pieces.push_back(asio::buffer(packet.head));
+      if (packet.body) pieces.push_back(asio::buffer(*packet.body));
+      if (!packet.tail.empty()) pieces.push_back(asio::buffer(packet.tail));
+    }
     asio::async_write(stream_, pieces, [self = this->shared_from_this()](error_code ec, std::size_t n) {
       self->writing_ = false;
-      self->outgoing_ = {};
+      self->outgoing_.clear();
       if (ec && !self->closing_) return self->lost(ec);
       if (self->closing_) return self->end_sending();
       self->owner_.tell(BytesSent(n));
@@ -140,7 +150,7 @@ class AsioConnection final : public Connection, public std::enable_shared_from_t
   asio::steady_timer linger_;
   runtime::Ref<Inbox> owner_;
   Bytes incoming_;
-  Packet outgoing_;
+  Packets outgoing_;
   bool reading_ = false;
   bool writing_ = false;
   bool closing_ = false;
@@ -152,6 +162,7 @@ void set_stream_options(tcp::socket& socket) {
   error_code ignored;  // without them the session works, only not as well
   socket.set_option(tcp::no_delay(true), ignored);
   socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+  setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
 }
 
 std::shared_ptr<Connection> make_connection(tcp::socket socket) {

@@ -16,8 +16,8 @@ class Connection {
   virtual void attach(runtime::Ref<Inbox> owner) = 0;
   /// Reads the next piece. One read at a time.
   virtual void read() = 0;
-  /// Writes all of `packet`. One write at a time.
-  virtual void write(Packet packet) = 0;
+  /// Writes all of `packets`, which are not empty, then tells BytesSent once. One write at a time.
+  virtual void write(Packets packets) = 0;
   /// Ends the stream; what was written is still delivered if the other side reads. Idempotent.
   virtual void close() = 0;
 };

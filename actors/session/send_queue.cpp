@@ -9,9 +9,14 @@ namespace {
 constexpr Microseconds kKeyPatience = 1'000'000;
 }  // namespace
 
+void SendQueue::insert_before_bulk(Item item) {
+  const auto bulk = std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kBulk; });
+  items_.insert(bulk, std::move(item));
+}
+
 void SendQueue::push_control(Packet packet) {
   control_waiting_bytes_ += packet.size();
-  items_.push_back({Kind::kControl, std::move(packet), nullptr, {}, 0, 0});
+  insert_before_bulk({Kind::kControl, std::move(packet), nullptr, {}, 0, 0});
 }
 
 void SendQueue::push_bulk(Packet packet) {
@@ -30,8 +35,7 @@ void SendQueue::push_coarse(Packet packet) {
     old->packet = std::move(packet);
     return;
   }
-  const auto geometry = std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.kind == Kind::kBulk; });
-  items_.insert(geometry, {Kind::kCoarse, std::move(packet), nullptr, {}, 0, 0});
+  insert_before_bulk({Kind::kCoarse, std::move(packet), nullptr, {}, 0, 0});
 }
 
 bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer,
@@ -102,11 +106,49 @@ void SendQueue::drop_pictures(StreamLayer layer) {
   mine.key_needed = mine.refused = true;
 }
 
-std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
-  if (under_way_since_ || items_.empty()) return std::nullopt;
+Packets SendQueue::take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
+  if (under_way_since_) return {};
+  auto packets = background_next() ? take_background() : take_messages(now, make, make_answer);
+  if (!packets.empty()) under_way_since_ = now;
+  return packets;
+}
+
+bool SendQueue::background_next() const {
+  if (background_.empty()) return false;
+  return items_.empty() || (picture_went_ && items_.front().kind == Kind::kPicture);
+}
+
+Packets SendQueue::take_background() {
+  Packets packets;
+  std::size_t bytes = 0;
+  while (!background_.empty() && (packets.empty() || bytes + background_.front().size() <= limits_.background_bytes)) {
+    bytes += background_.front().size();
+    packets.push_back(std::move(background_.front()));
+    background_.pop_front();
+  }
+  picture_went_ = false;
+  return packets;
+}
+
+Packets SendQueue::take_messages(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
+  Packets packets;
+  if (!items_.empty() && items_.front().kind == Kind::kPicture) {
+    picture_went_ = true;
+    packets.push_back(take_first(now, make, make_answer));
+    return packets;
+  }
+  std::size_t bytes = 0;
+  while (!items_.empty() && items_.front().kind != Kind::kPicture &&
+         (packets.empty() || bytes + items_.front().packet.size() <= limits_.write_bytes)) {
+    packets.push_back(take_first(now, make, make_answer));
+    bytes += packets.back().size();
+  }
+  return packets;
+}
+
+Packet SendQueue::take_first(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
   Item item = std::move(items_.front());
   items_.pop_front();
-  under_way_since_ = now;
   switch (item.kind) {
     case Kind::kControl:
       control_waiting_bytes_ -= item.packet.size();
@@ -128,7 +170,7 @@ std::optional<Packet> SendQueue::take(Microseconds now, const MakePicture& make,
       return make_answer(NoChange(item.answer, item.error));
     }
   }
-  return std::nullopt;
+  return {};
 }
 
 bool SendQueue::ask_for_key(Microseconds now, StreamLayer layer) {
@@ -149,6 +191,7 @@ bool SendQueue::too_slow(Microseconds now) const {
 
 void SendQueue::clear() {
   items_.clear();
+  background_.clear();
   bulk_waiting_ = control_waiting_bytes_ = 0;
   for (auto& t : tracks_) t.waiting = t.waiting_bytes = 0;
 }

@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "actors/session/bytes.hpp"
 #include "actors/session/session_messages.hpp"
@@ -13,36 +14,46 @@
 namespace darm::session {
 
 struct SendLimits {
-  std::size_t media_bytes = 4u << 20;     ///< pictures waiting behind another picture
-  Microseconds media_age = 500'000;       ///< age at which a waiting picture is too old to be of use
-  std::size_t control_bytes = 16u << 20;  ///< control messages waiting
-  Microseconds grace = 15'000'000;        ///< a packet that takes longer than this: the client does not read
+  std::size_t media_bytes = 4u << 20;        ///< pictures waiting behind another picture
+  Microseconds media_age = 500'000;          ///< age at which a waiting picture is too old to be of use
+  std::size_t control_bytes = 16u << 20;     ///< control messages waiting
+  Microseconds grace = 15'000'000;           ///< a write that takes longer than this: the client does not read
+  std::size_t write_bytes = 128u << 10;      ///< messages up to so many bytes together are one write
+  std::size_t background_bytes = 64u << 10;  ///< the same for the background, which others wait for
 };
 
-/// First in, first out. Control messages and geometry are never dropped. Pictures are dropped whole, and all that wait
-/// together with the new one, because each builds on the one before; then only a key frame is taken. The two layers are
-/// streams of their own in this, with limits of their own. While geometry waits no picture is taken. The answer of a
-/// dropped picture travels with the next one that is sent. No clock inside: `now` must not decrease.
+/// First in, first out, but: control messages and coarse textures overtake bulk, and the background goes when nothing
+/// else waits, or after each picture, so that neither keeps the other out. Messages go out several at a time, because
+/// each write costs a turn of the session, which on a busy machine is tens of milliseconds; bounded in bytes, because
+/// what comes meanwhile waits for the write. Control messages, bulk and background are never dropped. Pictures are
+/// dropped whole, and all that wait together with the new one, because each builds on the one before; then only a key
+/// frame is taken. The two layers are streams of their own in this, with limits of their own. While bulk waits no
+/// picture is taken. The answer of a dropped picture travels with the next one that is sent. No clock inside: `now`
+/// must not decrease.
 class SendQueue {
  public:
   explicit SendQueue(const SendLimits& limits) : limits_(limits) {}
 
   void push_control(Packet packet);
+  /// What the first picture needs.
   void push_bulk(Packet packet);
+  /// What is of use later.
+  void push_background(Packet packet) { background_.push_back(std::move(packet)); }
   /// Bulk that all later bulk and coarse textures need.
   void push_manifest(Packet packet);
-  /// Replaces a coarse texture that still waits. Overtakes waiting geometry, so that what comes of it can be drawn lit.
+  /// Replaces a coarse texture that still waits. Overtakes bulk, so that what comes of it can be drawn lit.
   void push_coarse(Packet packet);
   /// False: dropped (and with it whatever pictures waited).
   bool push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer, Microseconds now);
   /// An answer without a picture. Kept back for the next picture if the client is waiting for a key frame.
   void push_no_change(const NoChange& event);
 
-  /// The next packet, if none is under way. `make` turns a picture into bytes when its turn comes.
+  /// The next write, if none is under way: a picture by itself, or messages of one kind of the limits above. `make`
+  /// turns a picture into bytes when its turn comes.
   using MakePicture = std::function<Packet(const std::shared_ptr<const EncodedFrame>&, const ViewAnswer&)>;
   using MakeNoChange = std::function<Packet(const NoChange&)>;
-  [[nodiscard]] std::optional<Packet> take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
-  /// The packet under way is out.
+  [[nodiscard]] Packets take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
+  /// The write under way is out.
   void sent() { under_way_since_.reset(); }
 
   /// True when a key frame should be asked for: one is needed, there is room for it, and none was asked for lately.
@@ -52,15 +63,14 @@ class SendQueue {
   [[nodiscard]] bool too_slow(Microseconds now) const;
   /// Drops everything that waits; what is under way stays so.
   void clear();
-  [[nodiscard]] bool idle() const { return items_.empty() && !under_way_since_; }
-  [[nodiscard]] bool bulk_waits() const { return bulk_waiting_ > 0; }
+  [[nodiscard]] bool idle() const { return items_.empty() && background_.empty() && !under_way_since_; }
   [[nodiscard]] std::size_t pictures_dropped() const { return pictures_dropped_; }
 
  private:
   enum class Kind : std::uint8_t { kControl, kManifest, kBulk, kCoarse, kPicture, kNoChange };
   struct Item {
     Kind kind;
-    Packet packet;  // control, bulk, coarse
+    Packet packet;  // control, manifest, bulk, coarse
     std::shared_ptr<const EncodedFrame> frame;
     ViewAnswer answer;
     float error = 0;
@@ -81,9 +91,16 @@ class SendQueue {
   void drop_pictures(StreamLayer layer);
   void keep_answer(const ViewAnswer& answer);
   void attach_lost_answer(ViewAnswer& answer);
+  void insert_before_bulk(Item item);
+  [[nodiscard]] bool background_next() const;
+  [[nodiscard]] Packets take_background();
+  [[nodiscard]] Packets take_messages(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
+  [[nodiscard]] Packet take_first(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
 
   SendLimits limits_;
   std::deque<Item> items_;
+  std::deque<Packet> background_;
+  bool picture_went_ = false;  // since the background had its turn
   std::size_t bulk_waiting_ = 0;
   std::size_t control_waiting_bytes_ = 0;
   std::size_t pictures_dropped_ = 0;

@@ -81,8 +81,8 @@ void SessionActor::act(Actions&& actions) {
 
 void SessionActor::pump() {
   if (finished_) return;
-  if (auto packet = protocol_->next_packet(now_us())) {
-    connection_->write(std::move(*packet));
+  if (auto packets = protocol_->next_packets(now_us()); !packets.empty()) {
+    connection_->write(std::move(packets));
   } else if (protocol_->finished(now_us())) {
     finish(protocol_->end());
   }

@@ -10,13 +10,13 @@
 namespace darm::session {
 namespace {
 
-Packet goodbye_full() {
+Packets goodbye_full() {
   wire::Envelope envelope;
   envelope.mutable_goodbye()->set_reason(wire::Goodbye::SERVER_FULL);
   envelope.mutable_goodbye()->set_text("The server has as many clients as it may have; try again later.");
-  Packet packet;
-  packet.head = proto::frame(envelope);
-  return packet;
+  Packets packets(1);
+  packets[0].head = proto::frame(envelope);
+  return packets;
 }
 
 }  // namespace

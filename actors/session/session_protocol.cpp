@@ -306,7 +306,7 @@ void SessionProtocol::close(wire::Goodbye::Reason reason, std::string text, Micr
 
 void SessionProtocol::send(const wire::Envelope& envelope) { queue_.push_control(packet_of(envelope)); }
 
-std::optional<Packet> SessionProtocol::next_packet(Microseconds now) {
+Packets SessionProtocol::next_packets(Microseconds now) {
   return queue_.take(
       now,
       [this](const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer) {

@@ -68,8 +68,9 @@ class SessionProtocol {
   /// Says goodbye: what waits is dropped, the goodbye goes out next. The first reason stands.
   void close(wire::Goodbye::Reason reason, std::string text, Microseconds now);
 
-  /// The next bytes for the socket; nothing while some are under way.
-  [[nodiscard]] std::optional<Packet> next_packet(Microseconds now);
+  /// The next messages for the socket, to be written at once; none while some are under way. on_sent() says they are
+  /// out.
+  [[nodiscard]] Packets next_packets(Microseconds now);
   /// The connection can be closed.
   [[nodiscard]] bool finished(Microseconds now) const;
   /// The reason and sentence of the end, for the log; empty while it goes on.

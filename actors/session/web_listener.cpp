@@ -102,8 +102,8 @@ class WebSocketConnection final : public Connection, public std::enable_shared_f
   void read() override {
     on_strand([](auto& c) { c.start_read(); });
   }
-  void write(Packet packet) override {
-    on_strand([p = std::move(packet)](auto& c) mutable { c.start_write(std::move(p)); });
+  void write(Packets packets) override {
+    on_strand([p = std::move(packets)](auto& c) mutable { c.start_write(std::move(p)); });
   }
   void close() override {
     on_strand([](auto& c) { c.start_close(); });
@@ -137,25 +137,35 @@ class WebSocketConnection final : public Connection, public std::enable_shared_f
     owner_.tell(BytesReceived(std::move(bytes)));
   }
 
-  void start_write(Packet packet) {
+  void start_write(Packets packets) {
     if (writing_ || closing_ || !socket_.is_open()) return;
     writing_ = true;
-    outgoing_ = std::move(packet);
-    std::array<asio::const_buffer, 3> pieces{asio::buffer(outgoing_.head),
-                                             outgoing_.body ? asio::buffer(*outgoing_.body) : asio::const_buffer(),
-                                             asio::buffer(outgoing_.tail)};
+    outgoing_ = std::move(packets);
+    written_ = 0;
+    write_message(0);
+  }
+
+  // One packet is one message; the next one follows when it is out, without the owner in between.
+  void write_message(std::size_t index) {
+    const Packet& packet = outgoing_[index];
+    std::array<asio::const_buffer, 3> pieces{asio::buffer(packet.head),
+                                             packet.body ? asio::buffer(*packet.body) : asio::const_buffer(),
+                                             asio::buffer(packet.tail)};
     std::size_t drop = proto::kLengthBytes;
     for (auto& piece : pieces) {
       const auto here = std::min(drop, piece.size());
       piece += here;
       drop -= here;
     }
-    socket_.async_write(pieces, [self = this->shared_from_this()](error_code ec, std::size_t count) {
+    socket_.async_write(pieces, [self = this->shared_from_this(), index](error_code ec, std::size_t count) {
+      self->written_ += count;
+      const bool more = !ec && index + 1 < self->outgoing_.size();
+      if (more) return self->write_message(index + 1);
       self->writing_ = false;
-      self->outgoing_ = {};
+      self->outgoing_.clear();
       if (self->closing_) return self->say_close();
       if (ec) return self->lost(ec.message());
-      self->owner_.tell(BytesSent(count));
+      self->owner_.tell(BytesSent(self->written_));
     });
   }
 
@@ -191,7 +201,8 @@ class WebSocketConnection final : public Connection, public std::enable_shared_f
   asio::steady_timer linger_;
   beast::flat_buffer incoming_;
   runtime::Ref<Inbox> owner_;
-  Packet outgoing_;
+  Packets outgoing_;
+  std::size_t written_ = 0;
   bool reading_ = false;
   bool writing_ = false;
   bool closing_ = false;

@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       }
     }
     (void)protocol.on_tick(now);
-    while (protocol.next_packet(now)) (void)protocol.on_sent(now);
+    while (!protocol.next_packets(now).empty()) (void)protocol.on_sent(now);
   }
   return 0;
 }

@@ -16,11 +16,16 @@ class ScriptedConnection : public Connection {
  public:
   void attach(runtime::Ref<Inbox> owner) override { owner_ = std::move(owner); }
   void read() override { ++reads; }
-  void write(Packet packet) override {
-    reader.feed(packet.head);
-    if (packet.body) reader.feed(*packet.body);
-    reader.feed(packet.tail);
-    if (accepts_writes) owner_.tell(BytesSent(packet.size()));
+  void write(Packets packets) override {
+    ++writes;
+    std::size_t bytes = 0;
+    for (const auto& packet : packets) {
+      reader.feed(packet.head);
+      if (packet.body) reader.feed(*packet.body);
+      reader.feed(packet.tail);
+      bytes += packet.size();
+    }
+    if (accepts_writes) owner_.tell(BytesSent(bytes));
   }
   void close() override {
     closed = true;
@@ -37,6 +42,7 @@ class ScriptedConnection : public Connection {
 
   proto::FrameReader reader{proto::kMaxServerEnvelope};
   int reads = 0;
+  int writes = 0;
   bool accepts_writes = true;
   bool closed = false;
 
@@ -102,6 +108,17 @@ TEST_F(SessionActorTest, opens_and_is_found_by_its_number) {
   EXPECT_EQ(around->datagrams->size(), 1u);
   EXPECT_TRUE(connection->heard().at(0).has_welcome());
   EXPECT_EQ(connection->reads, 2);  // the next piece is read only when the last is handled
+}
+
+TEST_F(SessionActorTest, the_scene_goes_out_in_few_turns) {
+  const auto [scene, layout] = testing::grid(400);
+  around->scene = GeometryStream::build(scene, layout, 1.0f, 1).value();
+  open();
+  const auto chunks = around->scene->chunk_count();
+  ASSERT_GE(chunks, 30u);
+  EXPECT_EQ(connection->heard().size(), chunks + 2);
+  const auto bytes = around->scene->total_bytes();
+  EXPECT_LE(static_cast<std::size_t>(connection->writes), bytes / (SendLimits{}.write_bytes / 2) + 2) << bytes;
 }
 
 TEST_F(SessionActorTest, a_client_that_vanishes_leaves_nothing_behind) {

@@ -27,11 +27,17 @@ ViewAnswer answer(CameraSequence sequence) {
   return a;
 }
 
-// Takes packets and remembers which pictures and answers went out.
+// Takes writes and remembers which pictures and answers went out.
 struct Taker {
   std::vector<FrameNumber> frames;
   std::vector<CameraSequence> answers;
-  std::optional<Packet> take(SendQueue& q, Microseconds now) {
+  // The sizes of the messages of one write.
+  std::vector<std::size_t> sizes(SendQueue& q, Microseconds now = 0) {
+    std::vector<std::size_t> out;
+    for (const auto& p : take(q, now)) out.push_back(p.size());
+    return out;
+  }
+  Packets take(SendQueue& q, Microseconds now) {
     return q.take(
         now,
         [this](const auto& f, const ViewAnswer& a) {
@@ -77,22 +83,83 @@ TEST(SendQueue, the_layers_lose_pictures_each_for_itself) {
   EXPECT_EQ(q.pictures_dropped(), 3u);
   EXPECT_TRUE(q.push_picture(own(8, true), answer(0), 900'001));
   Taker taker;
-  while (taker.take(q, 900'002)) q.sent();
+  while (!taker.take(q, 900'002).empty()) q.sent();
   EXPECT_EQ(taker.frames, (std::vector<FrameNumber>{1, 8}));
   EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 0}));
 }
 
-TEST(SendQueue, one_packet_at_a_time_in_order) {
+using Sizes = std::vector<std::size_t>;
+
+TEST(SendQueue, one_write_at_a_time_in_order) {
   SendQueue q{SendLimits{}};
   Taker t;
   q.push_control(bytes(3));
   q.push_bulk(bytes(5));
-  EXPECT_EQ(t.take(q, 0)->size(), 3u);
-  EXPECT_FALSE(t.take(q, 0).has_value());
+  EXPECT_EQ(t.sizes(q), (Sizes{3, 5}));
+  q.push_bulk(bytes(7));
+  EXPECT_EQ(t.sizes(q), Sizes{});
   q.sent();
-  EXPECT_EQ(t.take(q, 0)->size(), 5u);
+  EXPECT_EQ(t.sizes(q), Sizes{7});
   q.sent();
   EXPECT_TRUE(q.idle());
+}
+
+// A turn of the session costs tens of milliseconds on a busy machine: 120 chunks one a turn took 3.7 s.
+TEST(SendQueue, a_write_holds_as_many_messages_as_its_bytes_allow) {
+  SendLimits limits;
+  limits.write_bytes = 100;
+  SendQueue q{limits};
+  Taker t;
+  for (const std::size_t size : {40, 40, 40, 250, 60, 40, 1}) q.push_bulk(bytes(size));
+  std::vector<Sizes> writes;
+  for (auto write = t.sizes(q); !write.empty(); write = t.sizes(q)) {
+    writes.push_back(write);
+    q.sent();
+  }
+  EXPECT_EQ(writes, (std::vector<Sizes>{{40, 40}, {40}, {250}, {60, 40}, {1}}));
+}
+
+TEST(SendQueue, control_messages_pass_between_the_writes_of_geometry) {
+  SendLimits limits;
+  limits.write_bytes = 100;
+  SendQueue q{limits};
+  Taker t;
+  for (int i = 0; i < 10; ++i) q.push_bulk(bytes(50));
+  EXPECT_EQ(t.sizes(q), (Sizes{50, 50}));
+  q.push_control(bytes(3));
+  q.push_coarse(bytes(80));
+  q.sent();
+  EXPECT_EQ(t.sizes(q), (Sizes{3, 80}));
+  q.sent();
+  EXPECT_EQ(t.sizes(q), (Sizes{50, 50}));
+}
+
+TEST(SendQueue, pictures_and_the_background_take_turns) {
+  SendLimits limits;
+  limits.background_bytes = 20;
+  SendQueue q{limits};
+  Taker t;
+  q.push_bulk(bytes(50));
+  for (int i = 0; i < 6; ++i) q.push_background(bytes(10));
+  EXPECT_EQ(t.sizes(q), Sizes{50}) << "what the first picture needs";
+  q.sent();
+  EXPECT_TRUE(q.push_picture(picture(1, true), answer(0), 0)) << "though there is geometry left";
+  EXPECT_TRUE(q.push_picture(picture(2, false), answer(0), 0));
+  q.push_control(bytes(3));
+  EXPECT_EQ(t.sizes(q), Sizes{1});
+  q.sent();
+  EXPECT_EQ(t.sizes(q), (Sizes{10, 10})) << "a stream that fills the line does not keep geometry out";
+  q.sent();
+  EXPECT_EQ(t.sizes(q), Sizes{1});
+  q.sent();
+  EXPECT_EQ(t.sizes(q), Sizes{3}) << "control messages wait for nobody";
+  for (int i = 0; i < 2; ++i) {
+    q.sent();
+    EXPECT_EQ(t.sizes(q), (Sizes{10, 10}));
+  }
+  q.sent();
+  EXPECT_TRUE(q.idle());
+  EXPECT_EQ(t.frames, (std::vector<FrameNumber>{1, 2}));
 }
 
 TEST(SendQueue, pictures_wait_until_the_geometry_is_out) {
@@ -140,7 +207,7 @@ TEST(SendQueue, no_change_waits_for_the_key_frame) {
   SendQueue q{SendLimits{}};
   Taker t;
   q.push_no_change(NoChange(answer(5), 0));
-  EXPECT_FALSE(t.take(q, 0).has_value());
+  EXPECT_TRUE(t.take(q, 0).empty());
   q.push_picture(picture(1, true), answer(4), 0);
   q.push_no_change(NoChange(answer(6), 0));
   t.take(q, 0);
@@ -179,20 +246,21 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
       q.push_picture(picture(n, key, 50 + random() % 200), answer(0), now);
       if (random() % 10 == 0) q.require_key();
       if (random() % 30 == 0) q.push_bulk(bytes(1));
+      if (random() % 10 == 0) q.push_background(bytes(1));
       if (q.ask_for_key(now)) want_key = true;
       if (busy && random() % 3 == 0) {
         q.sent();
         busy = false;
       }
       if (!busy) {
-        busy = q.take(
-                    now,
-                    [&](const auto& f, const ViewAnswer&) {
-                      out.emplace_back(f->frame, f->key);
-                      return bytes(1);
-                    },
-                    [](const NoChange&) { return bytes(1); })
-                   .has_value();
+        busy = !q.take(
+                     now,
+                     [&](const auto& f, const ViewAnswer&) {
+                       out.emplace_back(f->frame, f->key);
+                       return bytes(1);
+                     },
+                     [](const NoChange&) { return bytes(1); })
+                    .empty();
       }
     }
     FrameNumber last = 0;
