@@ -6,7 +6,7 @@
 
 namespace darm::proto {
 
-inline constexpr std::uint32_t kProtocolVersion = 1;
+inline constexpr std::uint32_t kProtocolVersion = 2;
 
 /// Bytes of length prefix before every Envelope on TCP, big-endian.
 inline constexpr std::size_t kLengthBytes = 4;
@@ -40,6 +40,18 @@ inline constexpr std::uint32_t kLargestLosslessViewPhysTex = 2048;
 /// Bytes of a vertex of GeometryChunk.vertices and of an entry of SceneManifest.patch_table.
 inline constexpr std::size_t kVertexBytes = 24;
 inline constexpr std::size_t kPatchEntryBytes = 12;
+
+/// What the codecs of geometry can make of so many bytes. meshopt spends at least 4 bytes on each byte of the stride
+/// for a block of at most 256 records, and at most 4 more than the block itself has (filled up to groups of 16); on a
+/// triangle 1 to 17 bytes. DEFLATE packs at most 1032 times. What claims more is refused before memory is taken.
+[[nodiscard]] constexpr std::uint64_t most_records(std::uint64_t bytes, std::uint32_t stride) {
+  return (bytes / (stride * 4ull) + 1) * 256;
+}
+[[nodiscard]] constexpr std::uint64_t most_packed_records(std::uint64_t count, std::uint32_t stride) {
+  return (count + 32) * stride + (count / 256 + 1) * stride * 4 + 64;
+}
+[[nodiscard]] constexpr std::uint64_t most_packed_indices(std::uint64_t count) { return count / 3 * 17 + 64; }
+[[nodiscard]] constexpr std::uint64_t most_inflated(std::uint64_t bytes) { return bytes * 1032; }
 
 /// A client sends something (a camera, feedback or a ping) at least this often, or it is taken for gone.
 inline constexpr std::int64_t kPingEverySeconds = 5;

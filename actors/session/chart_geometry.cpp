@@ -13,8 +13,8 @@ namespace darm::session {
 namespace {
 
 struct Vertex {
-  float position[3];
-  float uv[2];
+  std::int32_t position[3];
+  std::int32_t uv[2];
   std::uint32_t patch;
 };
 static_assert(sizeof(Vertex) == proto::kVertexBytes);
@@ -28,7 +28,28 @@ std::uint32_t spread(std::uint32_t v) {
   return v;
 }
 
+// The largest power of two that is at most `wanted`, but for numbers up to `largest` so large that their place on the
+// grid has at most the 24 bits of a float.
+float power_of_two_step(float wanted, float largest) {
+  const int wanted_exponent = std::ilogb(std::clamp(wanted, 1e-30f, 1e30f));
+  const int float_exponent = largest > 0 ? std::ilogb(largest) - 23 : wanted_exponent;
+  return std::ldexp(1.0f, std::max(wanted_exponent, float_exponent));
+}
+
+std::int32_t on_grid(float value, float step) { return static_cast<std::int32_t>(std::lround(value / step)); }
+
 }  // namespace
+
+GridSteps grid_steps(const scene::Mesh& mesh, const atlas::Chart& chart, float stretch, float q, float diagonal) {
+  float farthest = 0;
+  for (const auto& p : mesh.positions) farthest = std::max({farthest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  float largest_uv = 0;
+  for (const auto& triangle : chart.uv)
+    for (const auto& uv : triangle) largest_uv = std::max({largest_uv, std::abs(uv.x), std::abs(uv.y)});
+  const float texel = 1.0f / q;
+  const float world = std::min(texel / 128.0f, diagonal / 262144.0f);
+  return {power_of_two_step(world / std::max(stretch, 1e-20f), farthest), power_of_two_step(texel / 64.0f, largest_uv)};
+}
 
 std::vector<std::uint32_t> coherent_triangles(const scene::Mesh& mesh, const atlas::Chart& chart) {
   glm::vec3 low(INFINITY);
@@ -61,7 +82,7 @@ Bytes encode_vertices(const void* records, std::size_t count, std::size_t stride
   return out;
 }
 
-ChunkGeometry encode_chunk(const scene::Mesh& mesh, const atlas::Chart& chart,
+ChunkGeometry encode_chunk(const scene::Mesh& mesh, const atlas::Chart& chart, const GridSteps& steps,
                            const std::vector<std::uint32_t>& triangles, std::size_t first, std::size_t count) {
   ChunkGeometry out;
   out.bounds_min = glm::vec3(INFINITY);
@@ -73,8 +94,9 @@ ChunkGeometry encode_chunk(const scene::Mesh& mesh, const atlas::Chart& chart,
     for (int c = 0; c < 3; ++c) {
       const auto& p = mesh.positions[mesh.triangles[t][c]];
       const auto& uv = chart.uv[t][static_cast<std::size_t>(c)];
-      // -0 and 0 are one place: the sum turns -0 into 0.
-      corners.push_back({{p.x + 0.0f, p.y + 0.0f, p.z + 0.0f}, {uv.x + 0.0f, uv.y + 0.0f}, chart.local_patch[t]});
+      corners.push_back({{on_grid(p.x, steps.position), on_grid(p.y, steps.position), on_grid(p.z, steps.position)},
+                         {on_grid(uv.x, steps.uv), on_grid(uv.y, steps.uv)},
+                         chart.local_patch[t]});
       out.bounds_min = glm::min(out.bounds_min, p);
       out.bounds_max = glm::max(out.bounds_max, p);
     }

@@ -1,23 +1,17 @@
 #include "actors/session/frame_message.hpp"
 
-#include <zlib.h>
-
 #include <cmath>
-#include <span>
 
+#include "actors/session/deflate.hpp"
 #include "proto/framing.hpp"
 #include "proto/limits.hpp"
 
 namespace darm::session {
 namespace {
 
-std::string deflate(std::span<const std::uint8_t> tile) {
-  std::string out(compressBound(tile.size()), '\0');
-  uLongf size = out.size();
-  // Cannot fail: the buffer is as large as zlib asks for, and the level is legal.
-  compress2(reinterpret_cast<Bytef*>(out.data()), &size, tile.data(), tile.size(), Z_DEFAULT_COMPRESSION);
-  out.resize(size);
-  return out;
+std::string packed(std::span<const std::uint8_t> tile) {
+  const auto bytes = deflate(tile, Effort::kEachFrame);
+  return {bytes.begin(), bytes.end()};
 }
 
 SharedBytes serialize_body(const EncodedFrame& frame) {
@@ -30,8 +24,8 @@ SharedBytes serialize_body(const EncodedFrame& frame) {
     auto* edit = m.add_page_edits();
     edit->set_tile(e.tile.packed);
     edit->set_slot(e.slot);
-    if (e.coverage) edit->set_coverage(deflate(*e.coverage));
-    if (e.through) edit->set_through(deflate(*e.through));
+    if (e.coverage) edit->set_coverage(packed(*e.coverage));
+    if (e.through) edit->set_through(packed(*e.through));
   }
   for (const auto& w : frame.lossless) {
     if (!w.image) continue;

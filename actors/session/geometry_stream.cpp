@@ -3,16 +3,20 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <thread>
+#include <tuple>
 
 #include "actors/scene/view_materials.hpp"
 #include "actors/session/chart_geometry.hpp"
+#include "actors/session/deflate.hpp"
 #include "proto/darm.pb.h"
 #include "proto/framing.hpp"
 #include "proto/limits.hpp"
@@ -61,7 +65,7 @@ void put_levels(const atlas::Layout& layout, wire::SceneManifest& m) {
     for (const auto& p : level.placements) table.push_back({p.x, p.y, p.scale});
   }
   m.set_patch_count(layout.patch_count);
-  const auto packed = encode_vertices(table.data(), table.size(), sizeof(Entry));
+  const auto packed = deflate(encode_vertices(table.data(), table.size(), sizeof(Entry)), Effort::kOnceAScene);
   m.set_patch_table(packed.data(), packed.size());
 }
 
@@ -109,6 +113,60 @@ void put_surroundings(const scene::Scene& scene, float exposure, wire::SceneMani
   }
 }
 
+// The most that a length grows.
+float stretch_of(const glm::mat4& m) {
+  return std::max({glm::length(glm::vec3(m[0])), glm::length(glm::vec3(m[1])), glm::length(glm::vec3(m[2]))});
+}
+
+struct Piece {
+  std::uint32_t chart;
+  std::size_t first, count;  // of the chart's triangles in order
+};
+
+// Equal pieces of each chart, so that the last one is not a crumb.
+std::vector<Piece> pieces_of(const std::vector<std::vector<std::uint32_t>>& order) {
+  constexpr std::size_t kMost = GeometryStream::kTrianglesPerChunk;
+  std::vector<Piece> pieces;
+  for (std::uint32_t c = 0; c < order.size(); ++c) {
+    const std::size_t parts = (order[c].size() + kMost - 1) / kMost;
+    for (std::size_t p = 0; p < parts; ++p) {
+      const auto first = order[c].size() * p / parts;
+      pieces.push_back({c, first, order[c].size() * (p + 1) / parts - first});
+    }
+  }
+  return pieces;
+}
+
+SharedBytes chunk_message(const ChunkGeometry& g, const GridSteps& steps, std::uint32_t chart, std::uint32_t index) {
+  wire::Envelope envelope;
+  auto* chunk = envelope.mutable_geometry();
+  chunk->set_chart(chart);
+  chunk->set_index(index);
+  chunk->set_vertex_count(g.vertex_count);
+  chunk->set_index_count(g.index_count);
+  const auto vertices = deflate(g.vertices, Effort::kOnceAScene);
+  const auto indices = deflate(g.indices, Effort::kOnceAScene);
+  chunk->set_vertices(vertices.data(), vertices.size());
+  chunk->set_indices(indices.data(), indices.size());
+  chunk->set_position_step(steps.position);
+  chunk->set_uv_step(steps.uv);
+  return framed(envelope);
+}
+
+// Outward normals of what a picture shows: its four sides and the plane of the eye, all through the eye.
+std::array<glm::vec3, 5> view_planes(const Camera& camera, const Viewport& viewport) {
+  const float half = camera.fovy * 0.5f;
+  const float wide =
+      std::atan(std::tan(half) * static_cast<float>(viewport.width) / static_cast<float>(viewport.height));
+  std::array<glm::vec3, 5> planes = {{{std::cos(wide), 0, std::sin(wide)},
+                                      {-std::cos(wide), 0, std::sin(wide)},
+                                      {0, std::cos(half), std::sin(half)},
+                                      {0, -std::cos(half), std::sin(half)},
+                                      {0, 0, 1}}};
+  for (auto& p : planes) p = camera.orientation * p;
+  return planes;
+}
+
 // Of all bytes a client is sent before the first picture.
 std::uint64_t tag_of(const GeometryStream& stream) {
   std::uint64_t tag = XXH3_64bits(stream.manifest()->data(), stream.manifest()->size());
@@ -139,6 +197,14 @@ Result<void> check(const scene::Scene& scene, const atlas::Layout& layout, float
 
 }  // namespace
 
+GeometryStream::Box GeometryStream::box_of(const ChunkGeometry& g, const glm::mat4& to_world) {
+  const glm::vec3 center = (g.bounds_min + g.bounds_max) * 0.5f;
+  const glm::vec3 half = (g.bounds_max - g.bounds_min) * 0.5f;
+  return {glm::vec3(to_world * glm::vec4(center, 1.0f)),
+          {glm::vec3(to_world[0]) * half.x, glm::vec3(to_world[1]) * half.y, glm::vec3(to_world[2]) * half.z},
+          glm::length(half) * stretch_of(to_world)};
+}
+
 Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene::Scene& scene,
                                                                     const atlas::Layout& layout, float exposure,
                                                                     unsigned threads) {
@@ -148,46 +214,25 @@ Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene:
   std::vector<std::vector<std::uint32_t>> instances_of(layout.charts.size());
   for (std::uint32_t i = 0; i < layout.instances.size(); ++i) instances_of[layout.instances[i].chart].push_back(i);
 
+  // Triangles of each chart in order, and the grids their numbers are rounded to.
   std::vector<std::vector<std::uint32_t>> order(layout.charts.size());
+  std::vector<GridSteps> steps(layout.charts.size());
+  const float diagonal = std::max(glm::length(scene.bounds_max - scene.bounds_min), 1e-20f);
   parallel(order.size(), threads, [&](std::size_t c) {
-    order[c] = coherent_triangles(scene.meshes[layout.charts[c].mesh], layout.charts[c]);
+    const auto& chart = layout.charts[c];
+    float stretch = 0;
+    for (const auto i : instances_of[c]) stretch = std::max(stretch, stretch_of(scene.instances[i].to_world));
+    order[c] = coherent_triangles(scene.meshes[chart.mesh], chart);
+    steps[c] = grid_steps(scene.meshes[chart.mesh], chart, stretch, layout.q, diagonal);
   });
-  struct Piece {
-    std::uint32_t chart;
-    std::size_t first, count;
-  };
-  std::vector<Piece> pieces;
-  for (std::uint32_t c = 0; c < order.size(); ++c) {
-    // Equal pieces, so that the last one is not a crumb.
-    const std::size_t parts = (order[c].size() + kTrianglesPerChunk - 1) / kTrianglesPerChunk;
-    for (std::size_t p = 0; p < parts; ++p) {
-      const auto first = order[c].size() * p / parts;
-      pieces.push_back({c, first, order[c].size() * (p + 1) / parts - first});
-    }
-  }
+  const auto pieces = pieces_of(order);
   stream->chunks_.resize(pieces.size());
   parallel(pieces.size(), threads, [&](std::size_t p) {
-    const auto& piece = pieces[p];
-    const auto& chart = layout.charts[piece.chart];
-    const auto g = encode_chunk(scene.meshes[chart.mesh], chart, order[piece.chart], piece.first, piece.count);
-    wire::Envelope envelope;
-    auto* chunk = envelope.mutable_geometry();
-    chunk->set_chart(piece.chart);
-    chunk->set_index(static_cast<std::uint32_t>(p));
-    chunk->set_vertex_count(g.vertex_count);
-    chunk->set_index_count(g.index_count);
-    chunk->set_vertices(g.vertices.data(), g.vertices.size());
-    chunk->set_indices(g.indices.data(), g.indices.size());
-    auto& out = stream->chunks_[p];
-    out.bytes = framed(envelope);
-    const glm::vec3 center = (g.bounds_min + g.bounds_max) * 0.5f;
-    const float radius = glm::length(g.bounds_max - g.bounds_min) * 0.5f;
-    for (const auto i : instances_of[piece.chart]) {
-      const auto& m = scene.instances[i].to_world;
-      const float stretch =
-          std::max({glm::length(glm::vec3(m[0])), glm::length(glm::vec3(m[1])), glm::length(glm::vec3(m[2]))});
-      out.placed.push_back({glm::vec3(m * glm::vec4(center, 1.0f)), radius * stretch});
-    }
+    const auto& [c, first, count] = pieces[p];
+    const auto& chart = layout.charts[c];
+    const auto g = encode_chunk(scene.meshes[chart.mesh], chart, steps[c], order[c], first, count);
+    stream->chunks_[p].bytes = chunk_message(g, steps[c], c, static_cast<std::uint32_t>(p));
+    for (const auto i : instances_of[c]) stream->chunks_[p].placed.push_back(box_of(g, scene.instances[i].to_world));
   });
 
   wire::Envelope envelope;
@@ -216,20 +261,32 @@ Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene:
   return std::shared_ptr<const GeometryStream>(std::move(stream));
 }
 
-std::vector<std::uint32_t> GeometryStream::nearest_first(const glm::dvec3& position) const {
-  const glm::vec3 eye(position - origin_);
-  std::vector<std::pair<float, std::uint32_t>> keyed;
+GeometryStream::Order GeometryStream::order_for(const Camera& camera, const Viewport& viewport) const {
+  const glm::vec3 eye(camera.position - origin_);
+  const auto planes = view_planes(camera, viewport);
+  const auto seen = [&](const Box& box) {
+    return std::none_of(planes.begin(), planes.end(), [&](const glm::vec3& normal) {
+      const glm::vec3 reach = glm::abs(glm::transpose(box.half) * normal);
+      return glm::dot(box.center - eye, normal) > (reach.x + reach.y + reach.z) * 1.001f;
+    });
+  };
+  std::vector<std::tuple<bool, float, std::uint32_t>> keyed;  // out of view, distance, chunk
   keyed.reserve(chunks_.size());
   for (std::uint32_t c = 0; c < chunks_.size(); ++c) {
     float nearest = INFINITY;
-    for (const auto& s : chunks_[c].placed) {
-      nearest = std::min(nearest, std::max(0.0f, glm::distance(s.center, eye) - s.radius));
+    bool in_view = false;
+    for (const auto& box : chunks_[c].placed) {
+      nearest = std::min(nearest, std::max(0.0f, glm::distance(box.center, eye) - box.radius));
+      in_view = in_view || seen(box);
     }
-    keyed.emplace_back(nearest, c);
+    keyed.emplace_back(!in_view, nearest, c);
   }
   std::sort(keyed.begin(), keyed.end());
-  std::vector<std::uint32_t> order(keyed.size());
-  std::transform(keyed.begin(), keyed.end(), order.begin(), [](const auto& k) { return k.second; });
+  Order order;
+  for (const auto& [hidden, distance, chunk] : keyed) {
+    order.in_view += hidden ? 0 : 1;
+    order.chunks.push_back(chunk);
+  }
   return order;
 }
 

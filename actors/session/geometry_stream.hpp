@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <vector>
@@ -9,6 +11,8 @@
 #include "actors/atlas/layout.hpp"
 #include "actors/scene/scene.hpp"
 #include "actors/session/bytes.hpp"
+#include "actors/session/chart_geometry.hpp"
+#include "actors/types/camera.hpp"
 #include "actors/types/error.hpp"
 
 namespace darm::session {
@@ -27,21 +31,29 @@ class GeometryStream {
   [[nodiscard]] std::size_t chunk_count() const { return chunks_.size(); }
   [[nodiscard]] const SharedBytes& chunk(std::uint32_t index) const { return chunks_[index].bytes; }
 
-  /// All chunks, nearest to `position` (file coordinates) first: by the distance to the nearest of its instances.
-  [[nodiscard]] std::vector<std::uint32_t> nearest_first(const glm::dvec3& position) const;
+  /// All chunks in the order in which a client at `camera` (valid) wants them: first `in_view`, every one that may show
+  /// in its picture (boxes against the pyramid of view), then the others; each nearest first, by the distance to the
+  /// nearest of its instances.
+  struct Order {
+    std::vector<std::uint32_t> chunks;
+    std::uint32_t in_view = 0;
+  };
+  [[nodiscard]] Order order_for(const Camera& camera, const Viewport& viewport) const;
   [[nodiscard]] std::size_t total_bytes() const;
 
   /// Largest chunk: small enough to come in view-sized pieces, large enough to compress well.
   static constexpr std::uint32_t kTrianglesPerChunk = 8192;
 
  private:
-  struct Sphere {
+  struct Box {
     glm::vec3 center{0.0f};  // recentred world space
+    glm::mat3 half{0.0f};    // from the centre to three faces
     float radius = 0;
   };
+  static Box box_of(const ChunkGeometry& geometry, const glm::mat4& to_world);
   struct Chunk {
     SharedBytes bytes;
-    std::vector<Sphere> placed;  // one per instance
+    std::vector<Box> placed;  // one per instance
   };
 
   glm::dvec3 origin_{0.0};

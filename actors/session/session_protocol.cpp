@@ -140,19 +140,23 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
                      : "The client cannot take a PhysTex of at least 1024 pixels.",
                  now);
   }
-  auto eye = policy_.start.position;
+  ParsedPose first{policy_.start, policy_.start_viewport};
   if (hello.has_pose()) {
     if (const auto pose = parse_pose(hello.pose())) {
-      eye = pose->camera.position;
+      first = *pose;
     } else {
       fault("bad_pose", now, actions);
     }
   }
   state_ = State::kOpen;
-  const bool scene_known = hello.known_scene() == scene_->tag();
   const float target = target_error(hello);
-  send_welcome(*format, target, scene_known);
-  if (!scene_known) send_scene(eye);
+  if (hello.known_scene() == scene_->tag()) {
+    send_welcome(*format, target, true, 0);
+  } else {
+    const auto order = scene_->order_for(first.camera, first.viewport);
+    send_welcome(*format, target, false, order.in_view);
+    send_scene(order);
+  }
   actions.push_back(tile_scheduler::SessionOpened(id_, *format, target));
   actions.push_back(encoder::CoarseWanted(id_));
 }
@@ -164,7 +168,8 @@ float SessionProtocol::target_error(const wire::Hello& hello) const {
   return std::clamp(wanted, policy_.least_target_error, 1.0f);
 }
 
-void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, float target_error, bool scene_known) {
+void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, float target_error, bool scene_known,
+                                   std::uint32_t chunks_in_view) {
   wire::Envelope envelope;
   auto* w = envelope.mutable_welcome();
   w->set_version(proto::kProtocolVersion);
@@ -180,12 +185,17 @@ void SessionProtocol::send_welcome(const tile_scheduler::StreamFormat& format, f
   w->set_view_phystex(format.view_phystex);
   w->set_target_error(target_error);
   w->set_scene_known(scene_known);
+  w->set_chunks_in_view(chunks_in_view);
   send(envelope);
 }
 
-void SessionProtocol::send_scene(const glm::dvec3& eye) {
+// What the first picture shows goes before pictures, the rest of the geometry between them.
+void SessionProtocol::send_scene(const GeometryStream::Order& order) {
   queue_.push_manifest(packet_of(scene_->manifest()));
-  for (const auto index : scene_->nearest_first(eye)) queue_.push_bulk(packet_of(scene_->chunk(index)));
+  for (std::uint32_t i = 0; i < order.chunks.size(); ++i) {
+    auto packet = packet_of(scene_->chunk(order.chunks[i]));
+    i < order.in_view ? queue_.push_bulk(std::move(packet)) : queue_.push_background(std::move(packet));
+  }
 }
 
 void SessionProtocol::on_camera(const wire::CameraUpdate& update, Microseconds now, Actions& actions) {

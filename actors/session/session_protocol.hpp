@@ -49,7 +49,8 @@ using Action = std::variant<tile_scheduler::SessionOpened, tile_scheduler::ViewC
                             encoder::CoarseWanted, Noted>;
 using Actions = std::vector<Action>;
 
-/// One client from its first byte to its last: Hello, Welcome, manifest, geometry nearest first, CoarseTex, pictures.
+/// One client from its first byte to its last: Hello, Welcome, manifest, geometry in view, CoarseTex, pictures and
+/// the rest of the geometry.
 /// `now` is in microseconds and must not decrease.
 class SessionProtocol {
  public:
@@ -89,8 +90,9 @@ class SessionProtocol {
   std::optional<tile_scheduler::StreamFormat> negotiate(const wire::Hello& hello) const;
   [[nodiscard]] float target_error(const wire::Hello& hello) const;
   void send(const wire::Envelope& envelope);
-  void send_welcome(const tile_scheduler::StreamFormat& format, float target_error, bool scene_known);
-  void send_scene(const glm::dvec3& eye);
+  void send_welcome(const tile_scheduler::StreamFormat& format, float target_error, bool scene_known,
+                    std::uint32_t chunks_in_view);
+  void send_scene(const GeometryStream::Order& order);
   void ask_for_keys(Microseconds now, Actions& actions);
 
   SessionId id_;

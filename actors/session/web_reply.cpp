@@ -8,7 +8,7 @@
 namespace darm::session {
 namespace {
 
-static_assert(proto::kProtocolVersion == 1, "kStreamProtocol names the version");
+static_assert(proto::kProtocolVersion == 2, "kStreamProtocol names the version");
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);

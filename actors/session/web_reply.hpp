@@ -13,7 +13,7 @@ namespace darm::session {
 
 /// Where the WebSocket is, and the subprotocol it speaks (its number is proto::kProtocolVersion).
 inline constexpr std::string_view kStreamPath = "/stream";
-inline constexpr std::string_view kStreamProtocol = "darm.1";
+inline constexpr std::string_view kStreamProtocol = "darm.2";
 
 /// Of a request, what an answer depends on. Header values as they came; empty: absent.
 struct WebRequest {

@@ -7,6 +7,10 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <utility>
+
+#include "client/core/inflate.hpp"
+#include "proto/limits.hpp"
 
 namespace darm::client {
 namespace {
@@ -23,6 +27,51 @@ bool all_finite(const Range& values) {
 
 const unsigned char* bytes_of(const std::string& s) { return reinterpret_cast<const unsigned char*>(s.data()); }
 
+// The meshopt buffer of `count` records in `packed`; empty: `packed` is damaged, too large or too short for them.
+std::string unpack_records(const std::string& packed, std::uint64_t count, std::uint32_t stride) {
+  const auto at_most = std::min(proto::most_packed_records(count, stride), proto::most_inflated(packed.size()));
+  auto bytes = inflate(packed, at_most);
+  return bytes && count <= proto::most_records(bytes->size(), stride) ? std::move(*bytes) : std::string();
+}
+
+// A vertex as it comes, before its numbers are taken off the grid.
+struct GridVertex {
+  std::array<std::int32_t, 3> position;
+  std::array<std::int32_t, 2> uv;
+  std::uint32_t local_patch;
+};
+static_assert(sizeof(GridVertex) == sizeof(Vertex) && sizeof(GridVertex) == proto::kVertexBytes);
+
+Vertex off_grid(const GridVertex& v, float position_step, float uv_step) {
+  const auto at = [](std::int32_t n, float step) { return static_cast<float>(n) * step; };
+  return {{at(v.position[0], position_step), at(v.position[1], position_step), at(v.position[2], position_step)},
+          {at(v.uv[0], uv_step), at(v.uv[1], uv_step)},
+          v.local_patch};
+}
+
+bool decode_vertices(const wire::GeometryChunk& info, std::vector<Vertex>& out) {
+  if (info.vertex_count() == 0) return true;
+  const auto bytes = unpack_records(info.vertices(), info.vertex_count(), sizeof(GridVertex));
+  if (bytes.empty()) return false;
+  std::vector<GridVertex> grid(info.vertex_count());
+  if (meshopt_decodeVertexBuffer(grid.data(), grid.size(), sizeof(GridVertex), bytes_of(bytes), bytes.size()) != 0)
+    return false;
+  out.reserve(grid.size());
+  for (const auto& v : grid) out.push_back(off_grid(v, info.position_step(), info.uv_step()));
+  return true;
+}
+
+bool decode_indices(const wire::GeometryChunk& info, std::vector<std::uint32_t>& out) {
+  if (info.index_count() == 0) return true;
+  const auto at_most =
+      std::min(proto::most_packed_indices(info.index_count()), proto::most_inflated(info.indices().size()));
+  const auto bytes = inflate(info.indices(), at_most);
+  // The codec spends at least one byte on a triangle.
+  if (!bytes || info.index_count() / 3 > bytes->size()) return false;
+  out.resize(info.index_count());
+  return meshopt_decodeIndexBuffer(out.data(), out.size(), 4, bytes_of(*bytes), bytes->size()) == 0;
+}
+
 }  // namespace
 
 float srgb_to_linear(float encoded) {
@@ -32,8 +81,6 @@ float srgb_to_linear(float encoded) {
 float linear_to_srgb(float linear) {
   return linear <= 0.0031308f ? linear * 12.92f : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
 }
-
-std::uint64_t most_vertices(std::uint64_t bytes, std::uint32_t stride) { return (bytes / (stride * 4ull) + 1) * 256; }
 
 Result<SceneModel> SceneModel::from_manifest(const wire::SceneManifest& manifest, const SceneLimits& limits) {
   SceneModel model;
@@ -78,8 +125,8 @@ Result<void> SceneModel::read_patches(const wire::SceneManifest& manifest) {
   const std::uint64_t entries = std::uint64_t{patch_count_} * levels_.size();
   if (patch_count_ == 0 || entries > kMaxTableEntries)
     return fail(fmt::format("manifest: {} patches refused", patch_count_));
-  const auto& packed = manifest.patch_table();
-  if (entries > most_vertices(packed.size(), sizeof(PatchPlace))) return fail("manifest: patch table is too short");
+  const auto packed = unpack_records(manifest.patch_table(), entries, sizeof(PatchPlace));
+  if (packed.empty()) return fail("manifest: patch table does not fit the number of patches");
   places_.resize(entries);
   if (meshopt_decodeVertexBuffer(places_.data(), entries, sizeof(PatchPlace), bytes_of(packed), packed.size()) != 0) {
     return fail("manifest: patch table does not decode");
@@ -159,15 +206,10 @@ Result<Chunk> SceneModel::read_chunk(const wire::GeometryChunk& info) {
   if (info.index() >= expected_chunks_) return refuse("index is out of range");
   if (chunk_seen_[info.index()]) return refuse("came twice");
   if (info.chart() >= highest_base_.size()) return refuse("names no chart");
-  if (info.vertex_count() > limits_.max_chunk_vertices ||
-      info.vertex_count() > most_vertices(info.vertices().size(), sizeof(Vertex))) {
-    return refuse("too many vertices");
-  }
-  // The codec spends at least one byte on a triangle.
-  if (info.index_count() % 3 != 0 || info.index_count() > limits_.max_chunk_indices ||
-      info.index_count() / 3 > info.indices().size()) {
+  if (info.vertex_count() > limits_.max_chunk_vertices) return refuse("too many vertices");
+  if (info.index_count() % 3 != 0 || info.index_count() > limits_.max_chunk_indices)
     return refuse("wrong number of indices");
-  }
+  if (!(std::isfinite(info.position_step()) && std::isfinite(info.uv_step()))) return refuse("a step is not finite");
   const std::uint64_t bytes =
       std::uint64_t{info.vertex_count()} * sizeof(Vertex) + std::uint64_t{info.index_count()} * 4;
   if (geometry_bytes_ + bytes > limits_.max_geometry_bytes) return refuse("geometry is over the limit");
@@ -175,16 +217,8 @@ Result<Chunk> SceneModel::read_chunk(const wire::GeometryChunk& info) {
   Chunk chunk;
   chunk.chart = info.chart();
   chunk.index = info.index();
-  chunk.vertices.resize(info.vertex_count());
-  chunk.indices.resize(info.index_count());
-  if (info.vertex_count() > 0 && meshopt_decodeVertexBuffer(chunk.vertices.data(), info.vertex_count(), sizeof(Vertex),
-                                                            bytes_of(info.vertices()), info.vertices().size()) != 0) {
-    return refuse("vertices do not decode");
-  }
-  if (info.index_count() > 0 && meshopt_decodeIndexBuffer(chunk.indices.data(), info.index_count(), 4,
-                                                          bytes_of(info.indices()), info.indices().size()) != 0) {
-    return refuse("indices do not decode");
-  }
+  if (!decode_vertices(info, chunk.vertices)) return refuse("vertices do not decode");
+  if (!decode_indices(info, chunk.indices)) return refuse("indices do not decode");
   const std::uint32_t patches_left = patch_count_ - highest_base_[info.chart()];
   glm::vec3 low(INFINITY), high(-INFINITY);
   for (const auto& v : chunk.vertices) {

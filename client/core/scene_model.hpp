@@ -145,10 +145,6 @@ class SceneModel {
   bool has_clear_ = false;
 };
 
-/// Most elements of `stride` bytes that a meshopt vertex buffer of `bytes` can hold: each block of at most 256 spends
-/// at least 4 bytes on each byte of the stride. What claims more is refused before memory is taken.
-[[nodiscard]] std::uint64_t most_vertices(std::uint64_t bytes, std::uint32_t stride);
-
 [[nodiscard]] float srgb_to_linear(float encoded);
 [[nodiscard]] float linear_to_srgb(float linear);
 

@@ -1,10 +1,11 @@
 #include "client/core/stream_player.hpp"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <span>
 #include <utility>
+
+#include "client/core/inflate.hpp"
 
 namespace darm::client {
 namespace {
@@ -18,11 +19,8 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
 
 // Exactly `bytes` of one slot, or nothing.
 std::optional<std::string> inflate_slot(const std::string& packed, std::size_t bytes) {
-  std::string out(bytes, '\0');
-  uLongf size = bytes;
-  const int code = uncompress(reinterpret_cast<Bytef*>(out.data()), &size,
-                              reinterpret_cast<const Bytef*>(packed.data()), packed.size());
-  if (code != Z_OK || size != bytes) return std::nullopt;
+  auto out = inflate(packed, bytes);
+  if (out && out->size() != bytes) return std::nullopt;
   return out;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "actors/session/session_protocol.hpp"
+#include "proto/limits.hpp"
 
 using namespace darm;
 using namespace darm::session;
@@ -29,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Microseconds now = 0;
   if (size > 0 && data[0] % 2 == 0) {
     wire::Envelope hello;
-    hello.mutable_hello()->set_version(1);
+    hello.mutable_hello()->set_version(proto::kProtocolVersion);
     (void)protocol.on_bytes(proto::frame(hello), now);
   }
   for (std::size_t at = 1; at < size; at += piece) {

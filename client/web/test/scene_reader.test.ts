@@ -1,20 +1,23 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
+import {deflateSync} from 'node:zlib';
 
 import {create} from '@bufbuild/protobuf';
 import {MeshoptDecoder} from 'three/examples/jsm/libs/meshopt_decoder.module.js';
 
 import type {GeometryChunk, SceneManifest} from '../src/gen/darm_pb.js';
 import {GeometryChunkSchema, SceneManifestSchema} from '../src/gen/darm_pb.js';
-import {ChunkReader, mostVertices, pageEntry, readManifest, Refused} from '../src/worker/scene_reader.js';
+import {ChunkReader, mostRecords, pageEntry, readManifest, Refused} from '../src/worker/scene_reader.js';
 
 await MeshoptDecoder.ready;
 
-// A meshopt vertex buffer (version 0) of at most 16 zero records of `stride` bytes: the header, for each byte one group of
+const pack = (bytes: Uint8Array): Uint8Array => new Uint8Array(deflateSync(bytes));
+
+// A meshopt vertex buffer (version 0) of at most 16 zero records of `stride` bytes, packed: the header, for each byte one group of
 // 16 deltas that are all zero, and the tail with the first record.
 function zeroVertices(stride: number): Uint8Array {
   const tail = Math.max(32, stride);
-  return new Uint8Array([0xa0, ...new Array<number>(stride).fill(0), ...new Array<number>(tail).fill(0)]);
+  return pack(new Uint8Array([0xa0, ...new Array<number>(stride).fill(0), ...new Array<number>(tail).fill(0)]));
 }
 
 const identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -65,7 +68,8 @@ test('a chunk that contradicts itself is refused, and one that fits comes once',
     chart: 0, index: 0, vertexCount: 3, indexCount: 0, vertices: zeroVertices(24), ...more});
   const reader = new ChunkReader(readManifest(manifest()));
   for (const more of [{index: 1}, {vertexCount: 5000}, {vertexCount: 2 ** 31}, {indexCount: 3},
-    {indexCount: 1, indices: new Uint8Array(9)}, {vertices: new Uint8Array(40)}, {indexCount: 3, indices: new Uint8Array(9)}]) {
+    {indexCount: 1, indices: new Uint8Array(9)}, {vertices: new Uint8Array(40)},
+    {vertices: pack(new Uint8Array(1e6))}, {positionStep: NaN}, {uvStep: Infinity}, {indexCount: 3, indices: new Uint8Array(9)}]) {
     assert.throws(() => reader.read(chunk(more)), Refused, JSON.stringify(more));
     assert.equal(reader.complete, false);
   }
@@ -75,6 +79,6 @@ test('a chunk that contradicts itself is refused, and one that fits comes once',
 });
 
 test('what claims more vertices than its bytes can hold is seen before memory is taken', () => {
-  assert.ok(mostVertices(100, 24) >= 256);
-  assert.ok(mostVertices(100_000, 24) < 300_000);
+  assert.ok(mostRecords(100, 24) >= 256);
+  assert.ok(mostRecords(100_000, 24) < 300_000);
 });

@@ -79,7 +79,7 @@ class SessionActorTest : public ::testing::Test {
   void open() {
     session = system.spawn<SessionActor>("session/1", 64, SessionId{1}, around, connection);
     wire::Envelope hello;
-    hello.mutable_hello()->set_version(1);
+    hello.mutable_hello()->set_version(proto::kProtocolVersion);
     system.run_until_idle();
     connection->say(hello);
     system.run_until_idle();

@@ -14,6 +14,7 @@
 #include "actors/runtime/threaded_system.hpp"
 #include "actors/session/session_actor.hpp"
 #include "proto/darm.pb.h"
+#include "proto/limits.hpp"
 #include "tests/unit/session/small_scene.hpp"
 
 namespace darm::session {
@@ -38,7 +39,7 @@ class SchedulerProbe : public runtime::Actor<tile_scheduler::Inbox> {
 
 inline wire::Envelope hello() {
   wire::Envelope e;
-  e.mutable_hello()->set_version(1);
+  e.mutable_hello()->set_version(proto::kProtocolVersion);
   e.mutable_hello()->set_client("loopback");
   return e;
 }

@@ -92,7 +92,7 @@ class WebTest : public SessionWorld {
   template <class Stream>
   void join(websocket::stream<Stream>& socket, const std::string& origin = {}) {
     socket.set_option(websocket::stream_base::decorator([origin](websocket::request_type& request) {
-      request.set(http::field::sec_websocket_protocol, "darm.1");
+      request.set(http::field::sec_websocket_protocol, "darm.2");
       if (!origin.empty()) request.set(http::field::origin, origin);
     }));
     socket.binary(true);

@@ -26,6 +26,17 @@ TEST(SceneModel, TakesManifestAndChunk) {
   EXPECT_FALSE(scene->page_entry(3u << 28, entry));
 }
 
+TEST(SceneModel, TakesVerticesOffTheGrid) {
+  auto scene = SceneModel::from_manifest(synthetic::manifest());
+  ASSERT_TRUE(scene);
+  auto chunk = synthetic::square_chunk();
+  chunk.set_uv_step(0.5f);
+  ASSERT_TRUE(scene->add_chunk(chunk));
+  const auto& last = scene->chunks()[0].vertices[2];
+  EXPECT_EQ(last.position, (std::array<float, 3>{2, 2, 0}));
+  EXPECT_EQ(last.uv, (std::array<float, 2>{4, 4}));
+}
+
 TEST(SceneModel, RefusesHostileManifests) {
   using Change = void (*)(wire::SceneManifest&);
   const Change changes[] = {
@@ -81,8 +92,15 @@ TEST(SceneModel, RefusesHostileChunksAndStaysAsItWas) {
       [](auto& c) { c.set_index_count(0xfffffffcu); },
       [](auto& c) { c.set_vertices("garbage"); },
       [](auto& c) { c.set_indices("garbage"); },
-      [](auto& c) { c.set_vertices(synthetic::pack_vertices(std::vector<Vertex>(4, Vertex{{0, 0, 0}, {0, 0}, 1}))); },
-      [](auto& c) { c.set_vertices(synthetic::pack_vertices(std::vector<Vertex>(4, Vertex{{NAN, 0, 0}, {0, 0}, 0}))); },
+      [](auto& c) { c.set_vertices(synthetic::deflate("garbage")); },
+      [](auto& c) { c.set_vertices(synthetic::deflate(std::string(1 << 20, 'x'))); },
+      [](auto& c) { c.set_indices(synthetic::deflate(std::string(1 << 20, 'x'))); },
+      [](auto& c) {
+        c.set_vertices(synthetic::pack_vertices(std::vector<synthetic::GridVertex>(4, {{0, 0, 0}, {0, 0}, 1})));
+      },
+      [](auto& c) { c.set_position_step(NAN); },
+      [](auto& c) { c.set_uv_step(INFINITY); },
+      [](auto& c) { c.set_position_step(3e38f); },
       [](auto& c) { c.set_indices(synthetic::pack_indices({0, 1, 2, 0, 2, 9}, 10)); },
   };
   auto scene = SceneModel::from_manifest(synthetic::manifest());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <meshoptimizer.h>
+#include <zlib.h>
 
 #include <array>
 #include <cmath>
@@ -19,19 +20,35 @@ inline constexpr float kQ = 32;
 inline constexpr std::array<std::uint32_t, 3> kTilesPerAxis = {3, 2, 1};
 inline constexpr std::array<std::uint32_t, 3> kOrigin = {10, 5, 2};
 
+inline std::string deflate(const std::string& bytes) {
+  std::string out(compressBound(bytes.size()), '\0');
+  uLongf size = out.size();
+  compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  out.resize(size);
+  return out;
+}
+
+/// A vertex on the grid of kStep.
+struct GridVertex {
+  std::int32_t position[3];
+  std::int32_t uv[2];
+  std::uint32_t patch;
+};
+inline constexpr float kStep = 0.25f;
+
 template <class T>
 std::string pack_vertices(const std::vector<T>& v) {
   std::string out(meshopt_encodeVertexBufferBound(v.size(), sizeof(T)), '\0');
   out.resize(meshopt_encodeVertexBuffer(reinterpret_cast<unsigned char*>(out.data()), out.size(), v.data(), v.size(),
                                         sizeof(T)));
-  return out;
+  return deflate(out);
 }
 
 inline std::string pack_indices(const std::vector<std::uint32_t>& indices, std::size_t vertices) {
   std::string out(meshopt_encodeIndexBufferBound(indices.size(), vertices), '\0');
   out.resize(meshopt_encodeIndexBuffer(reinterpret_cast<unsigned char*>(out.data()), out.size(), indices.data(),
                                        indices.size()));
-  return out;
+  return deflate(out);
 }
 
 inline wire::InstanceInfo instance_at(float x, float y, float z) {
@@ -69,13 +86,14 @@ inline wire::SceneManifest manifest() {
 }
 
 inline wire::GeometryChunk square_chunk() {
-  std::vector<Vertex> v;
-  for (const auto& [x, y] : {std::pair{0.f, 0.f}, {2.f, 0.f}, {2.f, 2.f}, {0.f, 2.f}})
-    v.push_back({{x, y, 0}, {x, y}, 0});
+  std::vector<GridVertex> v;
+  for (const auto& [x, y] : {std::pair{0, 0}, {8, 0}, {8, 8}, {0, 8}}) v.push_back({{x, y, 0}, {x, y}, 0});
   const std::vector<std::uint32_t> i = {0, 1, 2, 0, 2, 3};
   wire::GeometryChunk c;
   c.set_vertex_count(4);
   c.set_index_count(6);
+  c.set_position_step(kStep);
+  c.set_uv_step(kStep);
   c.set_vertices(pack_vertices(v));
   c.set_indices(pack_indices(i, 4));
   return c;

@@ -30,7 +30,7 @@ class SessionProtocolTest : public ::testing::Test {
   Actions say(const wire::Envelope& e, Microseconds now = 1) { return protocol->on_bytes(proto::frame(e), now); }
   static wire::Envelope hello() {
     wire::Envelope e;
-    e.mutable_hello()->set_version(1);
+    e.mutable_hello()->set_version(proto::kProtocolVersion);
     e.mutable_hello()->set_client("test");
     e.mutable_hello()->set_max_phystex(2048);
     return e;
@@ -80,7 +80,9 @@ class SessionProtocolTest : public ::testing::Test {
 };
 
 TEST_F(SessionProtocolTest, a_hello_is_answered_in_the_agreed_order) {
-  start();
+  SessionPolicy policy;
+  policy.start = look_at({60, 20, 0}, {60, 6, 60}, 60.0);
+  start(policy);
   const auto actions = say(hello());
   EXPECT_EQ(count<tile_scheduler::SessionOpened>(actions), 1);
   EXPECT_EQ(count<encoder::CoarseWanted>(actions), 1);
@@ -95,6 +97,7 @@ TEST_F(SessionProtocolTest, a_hello_is_answered_in_the_agreed_order) {
   EXPECT_EQ(out[0].welcome().key().size(), 32u);
   EXPECT_EQ(out[0].welcome().udp_port(), 777u);
   EXPECT_EQ(out[0].welcome().phystex_size(), 2048u);
+  EXPECT_GT(out[0].welcome().chunks_in_view(), 0u);
   EXPECT_TRUE(out[1].has_manifest());
   EXPECT_TRUE(out[2].has_coarse()) << "overtakes the geometry that waits, so that it can be drawn lit";
   for (std::size_t i = 0; i < scene()->chunk_count(); ++i) EXPECT_TRUE(out[3 + i].has_geometry());
@@ -118,6 +121,27 @@ TEST_F(SessionProtocolTest, a_client_that_has_the_scene_is_not_sent_it_again) {
     EXPECT_EQ(out[0].welcome().scene_known(), same);
     EXPECT_EQ(out.size(), same ? 1u : first.size());
   }
+}
+
+TEST_F(SessionProtocolTest, pictures_come_once_all_that_is_in_view_is_there_not_all_there_is) {
+  start();
+  auto away = hello();
+  put_pose(look_at({5, 8, 7}, {5, 900, 7}, 40.0), Viewport{}, *away.mutable_hello()->mutable_pose());
+  (void)say(away);
+  const auto first = protocol->next_packets(1);
+  ASSERT_EQ(first.size(), 2u);
+  wire::Envelope welcome;
+  ASSERT_TRUE(welcome.ParseFromArray(first[0].head.data() + 4, static_cast<int>(first[0].head.size() - 4)));
+  EXPECT_EQ(welcome.welcome().chunks_in_view(), 0u);
+  (void)protocol->on_sent(1);
+  auto frame = std::make_shared<EncodedFrame>();
+  frame->frame = 1;
+  frame->key = true;
+  (void)protocol->on_frame(FrameEncoded(frame, {}), 1);
+  const auto out = heard();
+  ASSERT_EQ(out.size(), 1 + scene()->chunk_count());
+  EXPECT_TRUE(out[0].has_frame());
+  EXPECT_TRUE(out[1].has_geometry());
 }
 
 TEST_F(SessionProtocolTest, formats_are_what_both_sides_can_do) {
@@ -206,7 +230,7 @@ TEST_F(SessionProtocolTest, a_client_may_ask_for_a_key_frame_of_either_layer) {
 TEST_F(SessionProtocolTest, unknown_versions_are_refused_with_a_reason) {
   start();
   auto e = hello();
-  e.mutable_hello()->set_version(2);
+  e.mutable_hello()->set_version(proto::kProtocolVersion + 1);
   EXPECT_EQ(count<tile_scheduler::SessionOpened>(say(e)), 0);
   expect_goodbye(wire::Goodbye::VERSION_UNSUPPORTED);
 }

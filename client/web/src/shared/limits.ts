@@ -1,7 +1,7 @@
 // Sizes both ends of the wire agree on (proto/limits.hpp, client/core/scene_model.hpp). Checked before memory is taken.
 
-export const kProtocolVersion = 1;
-export const kSubprotocol = 'darm.1';
+export const kProtocolVersion = 2;
+export const kSubprotocol = 'darm.2';
 export const kStreamPath = '/stream';
 
 export const kTileSize = 30;

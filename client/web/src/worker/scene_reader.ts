@@ -5,6 +5,7 @@ import type {GeometryChunk, InstanceInfo, SceneManifest} from '../gen/darm_pb.js
 import {kMaxChunkIndices, kMaxChunkVertices, kMaxChunks, kMaxGeometryBytes, kMaxInstances, kMaxLevels,
   kMaxTableEntries, kNoBase, kPatchEntryBytes, kTileSize, kVertexBytes} from '../shared/limits.js';
 import type {AlphaMode, Background, Chunk, InstanceShape, LevelShape, SceneShape, Vec3} from '../shared/scene.js';
+import {inflate} from './inflate.js';
 
 /** The server contradicts itself; its message starts with the thing at fault. */
 export class Refused extends Error {}
@@ -29,12 +30,36 @@ function unpackLinear(rgb: number): Vec3 {
   return [channel(16), channel(8), channel(0)];
 }
 
-/**
- * Most elements of `stride` bytes that a meshopt vertex buffer of `bytes` can hold: each block of at most 256 spends at
- * least 4 bytes on each byte of the stride.
- */
-export function mostVertices(bytes: number, stride: number): number {
+// The same bounds as proto/limits.hpp.
+const mostInflated = (bytes: number): number => bytes * 1032;
+const mostPackedIndices = (count: number): number => (count / 3) * 17 + 64;
+
+function mostPackedRecords(count: number, stride: number): number {
+  return (count + 32) * stride + (Math.floor(count / 256) + 1) * stride * 4 + 64;
+}
+
+/** Most records of `stride` bytes that a meshopt vertex buffer of `bytes` can hold. */
+export function mostRecords(bytes: number, stride: number): number {
   return (Math.floor(bytes / (stride * 4)) + 1) * 256;
+}
+
+function decodeRecords(packed: Uint8Array, count: number, stride: number, fault: string): Uint8Array<ArrayBuffer> {
+  if (count === 0) return new Uint8Array(0);
+  const bytes = inflate(packed, Math.min(mostPackedRecords(count, stride), mostInflated(packed.length)));
+  check(bytes !== null && count <= mostRecords(bytes.length, stride), fault);
+  const out = new Uint8Array(count * stride);
+  decode(fault, () => MeshoptDecoder.decodeVertexBuffer(out, count, stride, bytes));
+  return out;
+}
+
+function decodeIndices(packed: Uint8Array, count: number, fault: string): Uint32Array<ArrayBuffer> {
+  if (count === 0) return new Uint32Array(0);
+  const bytes = inflate(packed, Math.min(mostPackedIndices(count), mostInflated(packed.length)));
+  // The codec spends at least one byte on a triangle.
+  check(bytes !== null && count / 3 <= bytes.length, fault);
+  const out = new Uint32Array(count);
+  decode(fault, () => MeshoptDecoder.decodeIndexBuffer(new Uint8Array(out.buffer), count, 4, bytes));
+  return out;
 }
 
 function readLevels(manifest: SceneManifest): LevelShape[] {
@@ -57,10 +82,8 @@ function readLevels(manifest: SceneManifest): LevelShape[] {
 function readPlaces(manifest: SceneManifest, levels: LevelShape[]): Uint32Array {
   const entries = manifest.patchCount * levels.length;
   check(manifest.patchCount > 0 && entries <= kMaxTableEntries, `manifest: ${manifest.patchCount} patches refused`);
-  check(entries <= mostVertices(manifest.patchTable.length, kPatchEntryBytes), 'manifest: patch table is too short');
-  const places = new Uint32Array(entries * 3);
-  decode('manifest: patch table does not decode', () =>
-    MeshoptDecoder.decodeVertexBuffer(new Uint8Array(places.buffer), entries, kPatchEntryBytes, manifest.patchTable));
+  const places = new Uint32Array(
+    decodeRecords(manifest.patchTable, entries, kPatchEntryBytes, 'manifest: patch table does not decode').buffer);
   const scales = new Float32Array(places.buffer);
   levels.forEach((level, l) => {
     for (let i = l * manifest.patchCount; i < (l + 1) * manifest.patchCount; ++i) {
@@ -159,6 +182,16 @@ export function pageEntry(levels: readonly LevelShape[], tile: number): number {
   return level !== undefined && index < level.tilesX * level.tilesY ? level.firstTile + index : -1;
 }
 
+// Integers of the grid become the numbers they stand for, in place.
+function takeOffGrid(info: GeometryChunk, vertices: Uint8Array<ArrayBuffer>): void {
+  const grid = new Int32Array(vertices.buffer);
+  const floats = new Float32Array(vertices.buffer);
+  for (let v = 0; v < grid.length; v += 6) {
+    for (let i = v; i < v + 3; ++i) floats[i] = grid[i]! * info.positionStep;
+    for (let i = v + 3; i < v + 5; ++i) floats[i] = grid[i]! * info.uvStep;
+  }
+}
+
 /** Reads the chunks of one scene; a refused one throws. */
 export class ChunkReader {
   private readonly seen: Uint8Array;
@@ -184,23 +217,15 @@ export class ChunkReader {
     };
     ok(info.index < this.seen.length, 'index is out of range');
     ok(this.seen[info.index] === 0, 'came twice');
-    ok(info.vertexCount <= kMaxChunkVertices && info.vertexCount <= mostVertices(info.vertices.length, kVertexBytes),
-       'too many vertices');
-    // The codec spends at least one byte on a triangle.
-    ok(info.indexCount % 3 === 0 && info.indexCount <= kMaxChunkIndices && info.indexCount / 3 <= info.indices.length,
-       'wrong number of indices');
+    ok(info.vertexCount <= kMaxChunkVertices, 'too many vertices');
+    ok(info.indexCount % 3 === 0 && info.indexCount <= kMaxChunkIndices, 'wrong number of indices');
+    ok(finite([info.positionStep, info.uvStep]), 'a step is not finite');
     const bytes = info.vertexCount * kVertexBytes + info.indexCount * 4;
     ok(this.bytes + bytes <= kMaxGeometryBytes, 'geometry is over the limit');
-    const vertices = new Uint8Array(info.vertexCount * kVertexBytes);
-    const indices = new Uint32Array(info.indexCount);
-    if (info.vertexCount > 0) {
-      decode(`geometry chunk ${info.index}: vertices do not decode`, () =>
-        MeshoptDecoder.decodeVertexBuffer(vertices, info.vertexCount, kVertexBytes, info.vertices));
-    }
-    if (info.indexCount > 0) {
-      decode(`geometry chunk ${info.index}: indices do not decode`, () =>
-        MeshoptDecoder.decodeIndexBuffer(new Uint8Array(indices.buffer), info.indexCount, 4, info.indices));
-    }
+    const vertices = decodeRecords(info.vertices, info.vertexCount, kVertexBytes,
+                                   `geometry chunk ${info.index}: vertices do not decode`);
+    const indices = decodeIndices(info.indices, info.indexCount, `geometry chunk ${info.index}: indices do not decode`);
+    takeOffGrid(info, vertices);
     const box = this.checkVertices(info, vertices, ok);
     ok(indices.every((i) => i < info.vertexCount), 'an index is out of range');
     this.bytes += bytes;

@@ -1,10 +1,9 @@
 // Keeps picture and page table of one stream in step: both of a frame, or neither (DESIGN section 4, "Frames").
-import {unzlibSync} from 'three/examples/jsm/libs/fflate.module.js';
-
 import type {StreamFrame} from '../gen/darm_pb.js';
 import {kAbsent, kSlotTexels} from '../shared/limits.js';
 import type {FrameUpdate, Planes, SceneShape, SlotBytes} from '../shared/scene.js';
 import {slotCount} from '../shared/scene.js';
+import {inflate} from './inflate.js';
 import {PageTable} from './page_table.js';
 import {pageEntry, Refused} from './scene_reader.js';
 import {NoDecoder} from './video_decoder.js';
@@ -24,17 +23,12 @@ interface Edit {
 
 const kNoTile = -1;
 
-// Exactly `bytes` of one slot. The output has room for one more from the start: nothing larger is ever unpacked, and what
-// is larger fills it.
+// Exactly `bytes` of one slot.
 function inflateSlot(packed: Uint8Array, bytes: number, what: string): Uint8Array | null {
   if (packed.length === 0) return null;
-  try {
-    const out = unzlibSync(packed, {out: new Uint8Array(bytes + 1)});
-    if (out.length === bytes) return out;
-  } catch {
-    // told below
-  }
-  throw new Refused(`${what} is not of a slot's size`);
+  const out = inflate(packed, bytes);
+  if (out?.length !== bytes) throw new Refused(`${what} is not of a slot's size`);
+  return out;
 }
 
 /**
