@@ -98,7 +98,7 @@ void SessionProtocol::on_envelope(const wire::Envelope& envelope, Microseconds n
     case Body::kFeedback:
       return on_feedback(envelope.feedback(), actions);
     case Body::kPing:
-      return on_ping(envelope.ping());
+      return on_ping(envelope.ping(), now);
     case Body::kPong:
       return;
     case Body::BODY_NOT_SET:
@@ -223,9 +223,10 @@ void SessionProtocol::on_feedback(const wire::Feedback& feedback, Actions& actio
   }
 }
 
-void SessionProtocol::on_ping(const wire::Ping& ping) {
+void SessionProtocol::on_ping(const wire::Ping& ping, Microseconds now) {
   wire::Envelope pong;
   pong.mutable_pong()->set_time_us(ping.time_us());
+  pong.mutable_pong()->set_server_time_us(now);
   send(pong);
 }
 
@@ -248,7 +249,7 @@ Actions SessionProtocol::on_datagram(const wire::DatagramBody& body, Microsecond
       on_feedback(body.feedback(), actions);
       break;
     case wire::DatagramBody::kPing:
-      on_ping(body.ping());
+      on_ping(body.ping(), now);
       break;
     case wire::DatagramBody::BODY_NOT_SET:
       break;

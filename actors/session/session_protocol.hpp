@@ -85,7 +85,7 @@ class SessionProtocol {
   void on_hello(const wire::Hello& hello, Microseconds now, Actions& actions);
   void on_camera(const wire::CameraUpdate& update, Microseconds now, Actions& actions);
   void on_feedback(const wire::Feedback& feedback, Actions& actions);
-  void on_ping(const wire::Ping& ping);
+  void on_ping(const wire::Ping& ping, Microseconds now);
   void fault(std::string_view what, Microseconds now, Actions& actions);
   std::optional<tile_scheduler::StreamFormat> negotiate(const wire::Hello& hello) const;
   [[nodiscard]] float target_error(const wire::Hello& hello) const;

@@ -30,6 +30,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr std::int64_t kClockPingEveryUs = 1'000'000;
+
 std::string errno_text() { return std::strerror(errno); }
 
 // UDP to the peer of a TCP socket, at another port.
@@ -95,6 +97,10 @@ struct Connection::State {
   bool ended = false;
   Error end_reason{"connection is closed"};
 
+  std::int64_t shortest_ping_us = 0, clock_ahead = 0;  // with `mutex`
+  bool pong_came = false;
+  std::int64_t next_clock_ping_us = 0;  // of the reader
+
   std::atomic<std::uint64_t> received{0}, sent{0};
   std::atomic<std::int64_t> last_sent_us{0};
   std::atomic<bool> stopping{false};
@@ -106,6 +112,7 @@ struct Connection::State {
   Result<void> read_some(proto::FrameReader& frames);
   bool take(Received message);
   void keep_alive();
+  void take_pong(const wire::Pong& pong, std::int64_t at_us);
   void end(Error reason);
 };
 
@@ -141,7 +148,10 @@ void Connection::State::end(Error reason) {
 
 // Queues a message, waiting while the queue is full. False: stop reading.
 bool Connection::State::take(Received message) {
-  if (message.envelope.has_pong()) return true;
+  if (message.envelope.has_pong()) {
+    take_pong(message.envelope.pong(), message.at_us);
+    return true;
+  }
   if (message.envelope.has_ping()) {
     wire::Envelope pong;
     pong.mutable_pong()->set_time_us(message.envelope.ping().time_us());
@@ -161,11 +171,23 @@ bool Connection::State::take(Received message) {
   return true;
 }
 
+void Connection::State::take_pong(const wire::Pong& pong, std::int64_t at_us) {
+  const std::int64_t took = at_us - pong.time_us();
+  const std::lock_guard lock(mutex);
+  if (pong.server_time_us() == 0 || took < 0 || (pong_came && took >= shortest_ping_us)) return;
+  pong_came = true;
+  shortest_ping_us = took;
+  clock_ahead = pong.server_time_us() - (pong.time_us() + took / 2);
+}
+
 // TCP counts as life for the server only if something is sent now and then.
 void Connection::State::keep_alive() {
-  if (now_us() - last_sent_us < (proto::kPingEverySeconds - 2) * 1'000'000) return;
+  const std::int64_t now = now_us();
+  const bool clock_due = options.measure_clock && now >= next_clock_ping_us;
+  if (!clock_due && now - last_sent_us < (proto::kPingEverySeconds - 2) * 1'000'000) return;
+  next_clock_ping_us = now + kClockPingEveryUs;
   wire::Envelope ping;
-  ping.mutable_ping()->set_time_us(now_us());
+  ping.mutable_ping()->set_time_us(now);
   if (auto ok = send_tcp(ping); !ok) end(ok.error());
 }
 
@@ -272,7 +294,7 @@ Result<std::unique_ptr<Connection>> Connection::open(const ConnectOptions& optio
   s.welcome = std::move(*welcome);
   s.key = proto::datagram_key(s.welcome.key());
   // Datagrams are authenticated, not encrypted: who asked for TLS gets it for all.
-  if (s.key && options.tls == Tls::kNone) s.udp = udp_beside(s.tcp->socket(), s.welcome.udp_port());
+  if (s.key && options.udp && options.tls == Tls::kNone) s.udp = udp_beside(s.tcp->socket(), s.welcome.udp_port());
   return connection;
 }
 
@@ -292,6 +314,11 @@ const wire::Welcome& Connection::welcome() const { return state_->welcome; }
 std::uint64_t Connection::bytes_received() const { return state_->received; }
 std::uint64_t Connection::bytes_sent() const { return state_->sent; }
 bool Connection::uses_udp() const { return state_->udp.get() >= 0; }
+
+std::optional<std::int64_t> Connection::server_clock_ahead() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->pong_came ? std::optional(state_->clock_ahead) : std::nullopt;
+}
 
 Result<std::optional<Received>> Connection::next(milliseconds timeout) {
   State& s = *state_;

@@ -34,6 +34,8 @@ struct ConnectOptions {
   std::uint32_t max_view_phystex = 1024;  ///< of the private layer; 0: light that does not depend on the eye alone
   std::uint64_t known_scene = 0;          ///< tag of a scene it has whole, manifest and geometry; 0: none
   std::stop_token stop;                   ///< ends opening early, with an error
+  bool udp = true;                        ///< cameras by UDP where the server offers it; else by TCP, as from browsers
+  bool measure_clock = false;             ///< ping once a second, for server_clock_ahead()
   std::chrono::milliseconds connect_timeout{5000};
   std::chrono::milliseconds handshake_timeout{20000};
   /// Nothing at all from the server for so long: it is taken for gone.
@@ -70,6 +72,9 @@ class Connection {
   [[nodiscard]] std::uint64_t bytes_received() const;
   [[nodiscard]] std::uint64_t bytes_sent() const;
   [[nodiscard]] bool uses_udp() const;
+  /// The server's clock (of its stamps) less this one, microseconds: of the ping that came back soonest, right to half
+  /// of what its ways differ. Nothing before the first pong.
+  [[nodiscard]] std::optional<std::int64_t> server_clock_ahead() const;
 
  private:
   struct State;

@@ -59,7 +59,8 @@ struct Arguments {
          updates_per_second = 10;
   std::uint32_t phystex = 2048, ceiling_phystex = 8192, view_phystex = 1024;
   unsigned bench_draw = 0;
-  bool lossless = false, no_444 = false, codec_check = false, json = false;
+  bool lossless = false, no_444 = false, no_udp = false, lag = false, check_first = false, codec_check = false,
+       json = false;
 };
 
 Result<Reference> read_reference(const std::string& file) {
@@ -112,6 +113,9 @@ Result<SessionPlan> make_plan(const Arguments& a) {
   plan.lossless = a.lossless;
   plan.target_error = a.target_error;
   plan.keep_tiles = a.codec_check;
+  plan.udp = !a.no_udp;
+  plan.lag = a.lag;
+  plan.check_first = a.check_first;
   plan.chroma_444 = !a.no_444;
   return plan;
 }
@@ -125,6 +129,7 @@ Result<Image8> ceiling_picture(const Arguments& a, SessionPlan plan) {
   plan.until_error.reset();
   plan.draw_times.clear();
   plan.lossless = true;
+  plan.lag = false;
   plan.max_phystex = a.ceiling_phystex;
   if (plan.max_view_phystex > 0) plan.max_view_phystex = 2048;
   auto session = run_session(plan, nullptr, 0);
@@ -225,6 +230,11 @@ void declare(CLI::App& app, Arguments& a) {
       ->check(kWritablePlace);
   app.add_flag("--lossless", a.lossless, "stream without codec (the server must allow it)");
   app.add_flag("--no-444", a.no_444, "do not offer 4:4:4 chroma");
+  app.add_flag("--no-udp", a.no_udp, "send cameras over TCP, as a browser does");
+  app.add_flag("--lag", a.lag,
+               "draw every picture that comes and report lag_ms, from a camera to the picture drawn for it, by stage");
+  app.add_flag("--check-first-picture", a.check_first,
+               "count the samples of the first picture that show no surface (takes a drawing more)");
   app.add_option("--phystex", a.phystex, "largest PhysTex to accept, pixels")->capture_default_str();
   app.add_option(
          "--view-phystex", a.view_phystex,

@@ -37,6 +37,10 @@ class Run {
   Result<void> note_series();
   Result<void> finish(unsigned bench_draws);
   std::string not_ready() const;
+  void count_bytes(const Received& message);
+  [[nodiscard]] bool has_view() const;
+  [[nodiscard]] Milestone milestone() const;
+  Result<void> draw_first_picture();
 
   const SessionPlan& plan_;
   const Reference* reference_;
@@ -50,9 +54,12 @@ class Run {
   std::unique_ptr<GlesRenderer> renderer_;
   std::int64_t start_us_ = 0, next_send_us_ = 0, first_image_us_ = 0, last_key_request_us_ = 0;
   std::int64_t decode_us_ = 0, draw_us_ = 0;
-  std::uint64_t bytes_handled_ = 0, newest_answer_ = 0, reported_frame_ = 0;
+  std::uint64_t newest_answer_ = 0, reported_frame_ = 0;
+  ByteCounts bytes_;
+  LagLog lag_;
   std::size_t next_draw_ = 0;
   bool picture_new_ = false;  // something came since the last draw
+  bool first_picture_drawn_ = false;
 };
 
 View Run::view_now() const {
@@ -121,7 +128,8 @@ Result<void> Run::handle_frame(const Received& message) {
   const std::int64_t before = now_us();
   const auto fate = player_->apply(frame, *scene_);
   if (!fate) return std::unexpected(fate.error());
-  decode_us_ = now_us() - before;
+  const std::int64_t decoded = now_us();
+  decode_us_ = decoded - before;
   if (*fate == FrameFate::kApplied) {
     if (plan_.keep_tiles) {
       for (const auto& pixels : frame.pixels()) kept_pixels_[static_cast<std::uint16_t>(pixels.slot())] = pixels.rgb();
@@ -131,6 +139,7 @@ Result<void> Run::handle_frame(const Received& message) {
     report_.error = frame.error();
     report_.latency_ms["decode"].push_back(static_cast<double>(decode_us_) / 1000.0);
     note_answer(frame.answers(), frame.stamps(), message.at_us);
+    if (plan_.lag) lag_.picture_decoded(frame.answers(), frame.stamps(), {message.at_us, before, decoded});
     picture_new_ = true;
   }
   return {};
@@ -148,8 +157,24 @@ Result<void> Run::handle_view_frame(const Received& message) {
   return {};
 }
 
+void Run::count_bytes(const Received& message) {
+  const auto& e = message.envelope;
+  bytes_.total = message.bytes_total;
+  if (e.has_manifest()) bytes_.manifest += message.bytes;
+  if (e.has_geometry()) bytes_.geometry += message.bytes;
+  if (e.has_coarse()) bytes_.coarse += message.bytes;
+  if (!e.has_frame() && !e.has_view_frame()) return;
+  const auto& frame = e.has_frame() ? e.frame() : e.view_frame();
+  std::uint64_t edits = 0;
+  for (const auto& edit : frame.page_edits()) edits += edit.ByteSizeLong() + 2;  // tag and length
+  bytes_.page_table += edits;
+  bytes_.video += message.bytes - std::min<std::uint64_t>(edits, message.bytes);
+}
+
+Milestone Run::milestone() const { return {elapsed(), bytes_, scene_->chunks().size()}; }
+
 Result<void> Run::handle(const Received& message) {
-  bytes_handled_ = message.bytes_total;
+  count_bytes(message);
   const auto& e = message.envelope;
   switch (e.body_case()) {
     case wire::Envelope::kManifest:
@@ -171,6 +196,7 @@ Result<void> Run::handle(const Received& message) {
       if (first_image_us_ > 0) report_.stream_bytes_after_first_image += message.bytes;
       report_.error = e.no_change().error();
       note_answer(e.no_change().answers(), e.no_change().stamps(), message.at_us);
+      lag_.no_change(e.no_change().answers());
       return {};
     default:
       return {};  // a newer server may say more
@@ -197,6 +223,7 @@ Result<void> Run::send_due() {
   next_send_us_ = std::max(next_send_us_ + period, now - period);
   const auto sent = connection_->send_camera(view_now());
   if (!sent) return std::unexpected(sent.error());
+  if (plan_.lag) lag_.camera_sent(*sent, now);
   ++report_.cameras;
   if (player_ && player_->frame_shown() != reported_frame_) {
     wire::Feedback feedback;
@@ -219,7 +246,9 @@ Result<void> Run::draw() {
   const std::int64_t before = now_us();
   if (auto ok = renderer_->draw(*scene_, view_now()); !ok) return ok;
   renderer_->finish();
-  draw_us_ = now_us() - before;
+  const std::int64_t drawn = now_us();
+  draw_us_ = drawn - before;
+  lag_.drawn(drawn);
   report_.draw_seconds.push_back(static_cast<double>(draw_us_) / 1e6);
   picture_new_ = false;
   return {};
@@ -238,20 +267,43 @@ Result<void> Run::note_series() {
   return {};
 }
 
-// The first full image as soon as it can be, then the points of the series.
+// All geometry that the first view can see.
+bool Run::has_view() const {
+  return scene_ && (scene_->complete() || scene_->chunks().size() >= connection_->welcome().chunks_in_view());
+}
+
+// CoarseTex covers every surface: the picture is complete without a single frame.
+Result<void> Run::draw_first_picture() {
+  if (auto ok = draw(); !ok) return ok;
+  report_.first_picture = milestone();
+  first_picture_drawn_ = true;
+  if (!plan_.check_first) return {};
+  const auto counts = renderer_->count_residency(*scene_, view_now());
+  if (!counts) return std::unexpected(counts.error());
+  report_.first_background = static_cast<double>(counts->background) / static_cast<double>(counts->samples);
+  return {};
+}
+
+// The first picture and the first full image as soon as they can be, then the points of the series.
 Result<void> Run::draw_if_due() {
-  if (!scene_ || !scene_->complete() || !player_->has_coarse()) return {};
+  if (!has_view() || !player_->has_coarse()) return {};
+  if (!first_picture_drawn_) {
+    if (auto ok = draw_first_picture(); !ok) return ok;
+    if (report_.frames > 0) picture_new_ = true;  // the frame of it is looked at below
+  }
   if (first_image_us_ == 0) {
     if (!picture_new_ || report_.frames == 0) return {};  // CoarseTex alone is not what the server has to show
     if (auto ok = draw(); !ok) return ok;
-    const double drawn_at = elapsed();
+    const auto drawn = milestone();
     const auto counts = renderer_->count_residency(*scene_, view_now());
     if (!counts) return std::unexpected(counts.error());
     if (counts->undefined > 0) return {};
     first_image_us_ = now_us();
-    report_.seconds_to_first_image = drawn_at;
-    report_.bytes_to_first_image = bytes_handled_;
+    report_.first_image = drawn;
     return note_series();
+  }
+  if (plan_.lag && picture_new_) {
+    if (auto ok = draw(); !ok) return ok;
   }
   bool due = false;
   for (; next_draw_ < plan_.draw_times.size() && elapsed() >= plan_.draw_times[next_draw_]; ++next_draw_) due = true;
@@ -265,10 +317,11 @@ Result<void> Run::step() {
   const auto wait = std::clamp<std::int64_t>((next_send_us_ - now_us()) / 1000, 0, 100);
   auto message = connection_->next(milliseconds(wait));
   if (!message) return std::unexpected(message.error());
-  // What has come together is handled together, up to the next camera.
+  // What has come together is handled together, up to the next camera; all of it where each picture is drawn, or slow
+  // drawing would leave ever more waiting.
   while (message->has_value()) {
     if (auto ok = handle(**message); !ok) return ok;
-    if (now_us() >= next_send_us_) break;
+    if (!plan_.lag && now_us() >= next_send_us_) break;
     message = connection_->next(milliseconds(0));
     if (!message) return std::unexpected(message.error());
   }
@@ -277,7 +330,7 @@ Result<void> Run::step() {
 
 std::string Run::not_ready() const {
   if (!scene_) return "no scene came";
-  if (!scene_->complete()) return fmt::format("{} geometry chunks came, not all", scene_->chunks().size());
+  if (!has_view()) return fmt::format("{} geometry chunks came, not all", scene_->chunks().size());
   if (!player_->has_coarse()) return "no CoarseTex came";
   return report_.frames == 0 ? "no frame came" : "some pixels had no light";
 }
@@ -298,6 +351,8 @@ Result<void> Run::finish(unsigned bench_draws) {
     report_.view_slots_used = view_player_->pages().resident();
   }
   report_.triangles = scene_->triangles();
+  report_.chunks = scene_->chunks().size();
+  if (plan_.lag) report_.lag = lag_.samples(connection_->server_clock_ahead().value_or(0));
   auto picture = renderer_->read_picture();
   if (!picture) return std::unexpected(picture.error());
   report_.picture = std::move(*picture);
@@ -329,6 +384,8 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   options.chroma_444 = plan_.chroma_444;
   options.target_error = static_cast<float>(plan_.target_error);
   options.lossless = plan_.lossless;
+  options.udp = plan_.udp;
+  options.measure_clock = plan_.lag;
   auto connection = Connection::open(options);
   if (!connection) return std::unexpected(connection.error());
   connection_ = std::move(*connection);

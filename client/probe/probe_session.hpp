@@ -12,6 +12,7 @@
 #include "client/core/renderer_gles.hpp"
 #include "client/probe/camera_path.hpp"
 #include "client/probe/codec_check.hpp"
+#include "client/probe/lag_log.hpp"
 
 namespace darm::client::probe {
 
@@ -29,7 +30,22 @@ struct SessionPlan {
   double target_error = 0;                ///< asked of the server; 0: its own
   bool lossless = false;
   bool chroma_444 = true;
-  bool keep_tiles = false;  ///< report what each resident tile shows at the end
+  bool keep_tiles = false;   ///< report what each resident tile shows at the end
+  bool udp = true;           ///< cameras by UDP where the server offers it
+  bool lag = false;          ///< draw every picture that comes, and report how long each camera took to it
+  bool check_first = false;  ///< count the pixels of the first picture that show no surface
+};
+
+/// Bytes received, by what they are for.
+struct ByteCounts {
+  std::uint64_t manifest = 0, geometry = 0, coarse = 0, video = 0, page_table = 0;
+  std::uint64_t total = 0;  ///< the protocol's own included
+};
+
+struct Milestone {
+  double seconds = 0;  ///< since the connection was begun
+  ByteCounts bytes;
+  std::size_t chunks = 0;  ///< of geometry
 };
 
 struct SeriesPoint {
@@ -42,8 +58,10 @@ struct SessionReport {
   Image8 picture;             ///< the last drawn
   ResidencyCounts residency;  ///< of that picture
   double seconds = 0;
-  double seconds_to_first_image = 0;
-  std::uint64_t bytes_to_first_image = 0;
+  Milestone first_picture;                 ///< drawn: every surface in view is there and lit, if only by CoarseTex
+  Milestone first_image;                   ///< drawn: the same with the first streamed frame
+  std::size_t chunks = 0;                  ///< of geometry, in all
+  std::optional<double> first_background;  ///< share of the first picture's samples without surface, with check_first
   std::uint64_t bytes = 0, stream_bytes = 0, sent_bytes = 0;
   double stream_seconds = 0;  ///< from the first image on
   std::uint64_t stream_bytes_after_first_image = 0;
@@ -51,6 +69,7 @@ struct SessionReport {
   std::optional<double> error;  ///< the server's newest estimate
   std::vector<SeriesPoint> series;
   std::map<std::string, std::vector<double>> latency_ms;
+  std::vector<LagSample> lag;        ///< with `lag`
   std::vector<double> draw_seconds;  ///< drawing and resolving, without reading back
   std::uint64_t triangles = 0;
   std::string device;  ///< the GL that drew

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,51 @@ double share(std::uint64_t part, std::uint64_t whole) {
 template <class T>
 Json optional(const std::optional<T>& value) {
   return value ? Json(*value) : Json(nullptr);
+}
+
+Json to_json(const Milestone& m) {
+  const auto& b = m.bytes;
+  const std::uint64_t named = b.manifest + b.geometry + b.coarse + b.video + b.page_table;
+  return {{"seconds", m.seconds},
+          {"bytes",
+           {{"total", b.total},
+            {"manifest", b.manifest},
+            {"geometry", b.geometry},
+            {"coarse", b.coarse},
+            {"video", b.video},
+            {"page_table", b.page_table},
+            {"protocol", b.total - std::min(named, b.total)}}},
+          {"chunks", m.chunks}};
+}
+
+double mean(const std::vector<double>& v) {
+  double sum = 0;
+  for (const double x : v) sum += x;
+  return v.empty() ? 0.0 : sum / static_cast<double>(v.size());
+}
+
+// Means add up to the whole; percentiles do not.
+Json lag_of(const std::vector<LagSample>& samples) {
+  if (samples.empty()) return nullptr;
+  std::vector<double> whole;
+  std::array<std::vector<double>, kLagStageCount> stages;
+  for (const auto& sample : samples) {
+    whole.push_back(static_cast<double>(sample.whole) / 1000.0);
+    for (std::size_t k = 0; k < kLagStageCount; ++k)
+      stages[k].push_back(static_cast<double>(sample.stages[k]) / 1000.0);
+  }
+  Json j{{"samples", samples.size()},
+         {"p50", percentile(whole, 0.5)},
+         {"p99", percentile(whole, 0.99)},
+         {"mean", mean(whole)}};
+  double sum = 0;
+  for (std::size_t k = 0; k < kLagStageCount; ++k) {
+    sum += mean(stages[k]);
+    j["stages"][kLagStages[k]] = {
+        {"p50", percentile(stages[k], 0.5)}, {"p99", percentile(stages[k], 0.99)}, {"mean", mean(stages[k])}};
+  }
+  j["sum_over_whole"] = mean(whole) > 0 ? sum / mean(whole) : 0.0;
+  return j;
 }
 
 double frames_per_second(const SessionReport& s) {
@@ -49,8 +95,12 @@ std::string to_json(const Outcome& o) {
   j["codec_tiles"] = o.codec ? Json(o.codec->tiles) : Json(nullptr);
   j["rmse"] = o.score ? Json(o.score->rmse) : Json(nullptr);
   j["error"] = optional(s.error);
-  j["seconds_to_first_image"] = s.seconds_to_first_image;
-  j["bytes_to_first_image"] = s.bytes_to_first_image;
+  j["seconds_to_first_image"] = s.first_image.seconds;
+  j["bytes_to_first_image"] = s.first_image.bytes.total;
+  j["first_picture"] = to_json(s.first_picture);
+  if (s.first_background) j["first_picture"]["background_fraction"] = *s.first_background;
+  j["first_image"] = to_json(s.first_image);
+  j["chunks"] = s.chunks;
   j["sharp_fraction"] = share(s.residency.sharp, s.residency.samples);
   j["coarser_fraction"] = share(s.residency.coarser, s.residency.samples);
   j["coarse_fraction"] = share(s.residency.coarse_tex, s.residency.samples);
@@ -82,6 +132,7 @@ std::string to_json(const Outcome& o) {
   for (const auto& [stage, values] : s.latency_ms)
     latency[stage] = {{"p50", percentile(values, 0.5)}, {"p99", percentile(values, 0.99)}};
   j["latency_ms"] = latency;
+  j["lag_ms"] = lag_of(s.lag);
   j["series"] = Json::array();
   for (const auto& p : s.series)
     j["series"].push_back({{"t", p.t}, {"psnr", optional(p.psnr)}, {"error", optional(p.error)}});
@@ -96,10 +147,12 @@ std::string to_text(const Outcome& o) {
   if (o.reference_psnr) text += fmt::format(", reference itself {:.2f} dB", *o.reference_psnr);
   if (!text.empty()) text += "\n";
   text += fmt::format(
-      "first full image after {:.2f} s and {:.2f} MB; {} frames, {} without change, {:.2f} Mbit/s, estimated error "
+      "first picture after {:.2f} s and {:.2f} MB, with the stream {:.2f} s and {:.2f} MB; {} frames, {} without "
+      "change, {:.2f} Mbit/s, estimated error "
       "{}\n",
-      s.seconds_to_first_image, static_cast<double>(s.bytes_to_first_image) / 1e6, s.frames, s.no_changes,
-      mbit_per_second(s), s.error ? fmt::format("{:.4f}", *s.error) : "not told");
+      s.first_picture.seconds, static_cast<double>(s.first_picture.bytes.total) / 1e6, s.first_image.seconds,
+      static_cast<double>(s.first_image.bytes.total) / 1e6, s.frames, s.no_changes, mbit_per_second(s),
+      s.error ? fmt::format("{:.4f}", *s.error) : "not told");
   text += fmt::format("sharp {:.1f} %, coarser {:.1f} %, CoarseTex {:.1f} %, background {:.1f} %\n",
                       100 * share(s.residency.sharp, s.residency.samples),
                       100 * share(s.residency.coarser, s.residency.samples),
@@ -112,6 +165,14 @@ std::string to_text(const Outcome& o) {
   for (const auto& [stage, values] : s.latency_ms) {
     text +=
         fmt::format("{:>12}: p50 {:.1f} ms, p99 {:.1f} ms\n", stage, percentile(values, 0.5), percentile(values, 0.99));
+  }
+  const Json lag = lag_of(s.lag);
+  if (!lag.is_null()) {
+    text += fmt::format("shading lag: p50 {:.1f} ms, p99 {:.1f} ms, mean {:.1f} ms =", lag["p50"].get<double>(),
+                        lag["p99"].get<double>(), lag["mean"].get<double>());
+    for (const auto& [name, stage] : lag["stages"].items())
+      text += fmt::format(" {} {:.1f}", name, stage["mean"].get<double>());
+    text += "\n";
   }
   text += fmt::format("{:.2f} frames/s on {}{}\n", frames_per_second(s), s.device,
                       o.benched ? "" : " (few draws; --bench-draw measures)");

@@ -128,6 +128,35 @@ TEST(Connection, ShakesHandsTalksAndSaysGoodbye) {
   EXPECT_EQ((*message)->bytes_total, (*connection)->bytes_received());
 }
 
+TEST(Connection, MeasuresTheServersClock) {
+  constexpr std::int64_t kAhead = 5'000'000'000;
+  FakeServer server([](Peer& peer) {
+    EXPECT_TRUE(peer.read().has_hello());
+    peer.send(welcome());
+    for (int i = 0; i < 2; ++i) {
+      const auto ping = peer.read();
+      if (!ping.has_ping()) return;
+      wire::Envelope pong;
+      pong.mutable_pong()->set_time_us(ping.ping().time_us());
+      pong.mutable_pong()->set_server_time_us(now_us() + kAhead);
+      peer.send(pong);
+    }
+    wire::Envelope answer;
+    answer.mutable_no_change()->set_answers(1);
+    peer.send(answer);
+    EXPECT_TRUE(peer.read().has_goodbye());
+  });
+  auto options = to(server.port);
+  options.measure_clock = true;
+  auto connection = Connection::open(options);
+  ASSERT_TRUE(connection) << connection.error().message;
+  const auto message = (*connection)->next(10s);
+  ASSERT_TRUE(message && *message);
+  const auto ahead = (*connection)->server_clock_ahead();
+  ASSERT_TRUE(ahead);
+  EXPECT_NEAR(static_cast<double>(*ahead - kAhead), 0.0, 1e6);  // half of the longest that a ping may take here
+}
+
 TEST(Connection, APrivateLayerLargerThanAskedForIsRefused) {
   FakeServer server([](Peer& peer) {
     EXPECT_EQ(peer.read().hello().max_view_phystex(), 512u);

@@ -255,7 +255,10 @@ TEST_F(SessionProtocolTest, a_silent_client_is_let_go) {
   wire::Envelope ping;
   ping.mutable_ping()->set_time_us(5);
   (void)say(ping, 29 * kSecond);
-  ASSERT_EQ(heard().size(), 1u);
+  const auto pong = heard();
+  ASSERT_EQ(pong.size(), 1u);
+  EXPECT_EQ(pong[0].pong().time_us(), 5);
+  EXPECT_EQ(pong[0].pong().server_time_us(), 29 * kSecond);
   (void)protocol->on_tick(58 * kSecond);
   EXPECT_TRUE(protocol->open());
   (void)protocol->on_tick(60 * kSecond);
