@@ -36,7 +36,8 @@ test('the page opens on the default scene, complete within two seconds', async (
   await warm.page.close();
   const {page, faults} = await visit(context);
   const s = await until(page, (now) => now.firstPictureMs !== null, 30, 'a complete picture');
-  t.diagnostic(`first complete picture ${s.firstPictureMs.toFixed(0)} ms after opening, ${s.bytesToFirstPicture} bytes`);
+  t.diagnostic(`first complete picture ${s.firstPictureMs.toFixed(0)} ms after opening, ${s.bytesToFirstPicture} bytes: ` +
+    JSON.stringify(s.firstPictureBytes));
   assert.ok(s.firstPictureMs < 2000, `${s.firstPictureMs} ms`);
   assert.equal(await page.title(), 'default – DARM');
   await until(page, (now) => now.streamFrames > 0 && now.finest, 20, 'the stream, drawn at its finest');
@@ -92,7 +93,10 @@ test('walking changes the view at the next frame, though the stream lags by half
   assert.ok(new Set(frames.map((f) => f.place)).size > 5, 'and goes on, frame by frame');
   assert.ok(difference(still, walking) > 1, 'what is seen has changed');
   const s = await until(page, (now) => now.lagMs !== null && now.lagMs > 900, 20, 'a lag that the line makes (there and back)');
-  t.diagnostic(`shading lag ${s.lagMs.toFixed(0)} ms`);
+  t.diagnostic(`shading lag ${s.lagMs.toFixed(0)} ms: ${JSON.stringify(s.lagStages)}`);
+  const sum = Object.values(s.lagStages).reduce((a, b) => a + b, 0);
+  assert.ok(Math.abs(sum - s.lagMs) < 0.05 * s.lagMs, `stages ${sum} of ${s.lagMs} ms`);
+  assert.ok(s.lagStages.network > 900, 'the line is what takes so long');
   await context.close();
 });
 

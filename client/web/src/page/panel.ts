@@ -1,5 +1,5 @@
 // The panel of measurements. Its texts are made here, pure; the element shows them.
-import type {Traffic} from '../shared/messages.js';
+import type {LagStages, Traffic} from '../shared/messages.js';
 import type {Residency} from './residency.js';
 
 export interface Measured {
@@ -12,6 +12,7 @@ export interface Measured {
   traffic: Traffic;
   /** From a camera sent until a picture made for it was drawn; null: none yet. */
   lagMs: number | null;
+  lagStages: (LagStages & {display: number}) | null;
   residency: Residency | null;
   /** Estimated RMS display error, 0..1; null: none yet. */
   error: number | null;
@@ -31,6 +32,10 @@ function percent(share: number): string {
   return `${(share * 100).toFixed(share < 0.0995 ? 1 : 0)} %`;
 }
 
+function parts(stages: LagStages & {display: number}): string {
+  return Object.entries(stages).map(([name, ms]) => `${name} ${ms.toFixed(0)}`).join(', ');
+}
+
 /** Label and value of each line, by the name of its place in the page. */
 export function lines(m: Measured): Record<string, string> {
   const fallback = m.residency === null ? null : m.residency.coarser + m.residency.coarseTex + m.residency.undefined;
@@ -38,7 +43,7 @@ export function lines(m: Measured): Record<string, string> {
   return {
     frames: m.framesPerSecond === null ? 'still' : `${m.framesPerSecond.toFixed(0)}${m.level > 0 ? ', coarser' : ''}`,
     stream: rate(m.bitsPerSecond),
-    lag: m.lagMs === null ? '–' : `${m.lagMs.toFixed(0)} ms`,
+    lag: m.lagMs === null ? '–' : `${m.lagMs.toFixed(0)} ms${m.lagStages === null ? '' : `: ${parts(m.lagStages)}`}`,
     fallback: fallback === null ? '–' : percent(fallback),
     // PSNR = -20 log10 of the RMS error.
     error: m.error === null || m.error < 0 ? '–'

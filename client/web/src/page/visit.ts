@@ -1,5 +1,5 @@
 // One visit: ties the stream, the renderer, the camera and the page's few buttons together.
-import type {FromWorker, OutReason, ToWorker, Traffic} from '../shared/messages.js';
+import type {Answer, FromWorker, LagStages, OutReason, ToWorker, Traffic} from '../shared/messages.js';
 import type {Chunk, FrameUpdate, Planes, SceneShape, StreamShape} from '../shared/scene.js';
 import type {View} from './camera.js';
 import {forward, fromPose, right, toPose, up} from './camera.js';
@@ -25,6 +25,8 @@ const kPanelEveryMs = 500;
 export interface Status {
   firstPictureMs: number | null;
   bytesToFirstPicture: number | null;
+  /** The same by kind; the rest is the protocol's. */
+  firstPictureBytes: {geometry: number; coarse: number; stream: number} | null;
   framesDrawn: number;
   streamFrames: number;
   finest: boolean;
@@ -34,6 +36,8 @@ export interface Status {
   view: View | null;
   error: number | null;
   lagMs: number | null;
+  /** What it is made of. */
+  lagStages: (LagStages & {display: number}) | null;
   residency: Residency | null;
   /** Bytes of messages so far. */
   received: number;
@@ -51,6 +55,7 @@ export class Visit implements InputOwner {
   private shape: StreamShape = {size: 0, viewSize: 0};
   private shapeNew = false;
   private chunks: Chunk[] = [];
+  private chunksInView = 0;
   private coarse: Planes | null = null;
   private placedView: boolean;  // by the link or by hand: the server's start does not move it
   private loop = 0;
@@ -61,13 +66,14 @@ export class Visit implements InputOwner {
   private cameraAt = -Infinity;
   private cameraDirty = true;
   private cameraEveryMs = 50;
-  private answersUs = 0;
+  private answer: Answer | null = null;  // the newest camera whose picture is not on the screen yet
   private panelAt = 0;
   private streamBytes: {at: number; bytes: number}[] = [];
-  private traffic: Traffic = {received: 0, stream: 0, decodeMs: 0, framesLost: 0};
+  private traffic: Traffic = {received: 0, stream: 0, geometry: 0, coarse: 0, decodeMs: 0,
+    framesLost: 0};
   private residency: Residency | null = null;
-  private status: Status = {firstPictureMs: null, bytesToFirstPicture: null, framesDrawn: 0, streamFrames: 0,
-    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, lagMs: null, residency: null,
+  private status: Status = {firstPictureMs: null, bytesToFirstPicture: null, firstPictureBytes: null, framesDrawn: 0, streamFrames: 0,
+    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, lagMs: null, lagStages: null, residency: null,
     received: 0};
   private shownFrame = 0;
   private linkTimer = 0;
@@ -142,11 +148,10 @@ export class Visit implements InputOwner {
         this.coarse = m.picture;
         this.renderer?.putCoarse(m.picture);
         return this.redraw();
-      case 'frame': return this.takeFrame(m.update, m.answersUs, m.error);
+      case 'frame': return this.takeFrame(m.update, m.answer, m.error);
       case 'answer':
-        this.answersUs = Math.max(this.answersUs, m.answersUs);
         if (m.error >= 0) this.status.error = m.error;
-        return this.noteLag();
+        return;
       case 'traffic': return this.noteTraffic(m.traffic);
       case 'out': return this.out(m.reason, m.text, m.retryMs);
     }
@@ -160,9 +165,10 @@ export class Visit implements InputOwner {
     this.status.joined = true;
     this.shapeNew = m.shape.size !== this.shape.size || m.shape.viewSize !== this.shape.viewSize;
     this.shape = m.shape;
+    this.chunksInView = m.chunksInView;
     this.cameraEveryMs = 1000 / Math.min(60, Math.max(5, 2 * m.updatesPerSecond));
     if (!this.placedView) this.rig.view = fromPose(m.start);
-    this.answersUs = 0;
+    this.answer = null;
     this.cameraDirty = true;
     this.redraw();
     // The same scene with slots of another size: the renderer is made anew, the geometry is here.
@@ -201,12 +207,12 @@ export class Visit implements InputOwner {
     this.notices.quiet('');
   }
 
-  private takeFrame(update: FrameUpdate, answersUs: number, error: number): void {
+  private takeFrame(update: FrameUpdate, answer: Answer | null, error: number): void {
     this.renderer?.apply(update);
     if (update.picture !== null) this.say({type: 'recycle', buffer: update.picture.buffer}, [update.picture.buffer]);
     if (update.layer === 'shared') this.shownFrame = update.frame;
     ++this.status.streamFrames;
-    this.answersUs = Math.max(this.answersUs, answersUs);
+    if (answer !== null) this.answer = answer;
     if (error >= 0) this.status.error = error;
     this.redraw();
   }
@@ -302,9 +308,11 @@ export class Visit implements InputOwner {
 
   private noteFirst(renderer: Renderer): void {
     if (this.status.firstPictureMs !== null || !renderer.textures.hasCoarse) return;
-    if (this.chunks.length < (this.scene?.chunkCount ?? Infinity)) return;
+    if (this.chunks.length < Math.min(this.scene?.chunkCount ?? Infinity, this.chunksInView)) return;
+    const {geometry, coarse, stream} = this.traffic;
     this.status.firstPictureMs = performance.now();
     this.status.bytesToFirstPicture = this.traffic.received;
+    this.status.firstPictureBytes = {geometry, coarse, stream: stream - coarse};
     performance.mark('darm first picture');
   }
 
@@ -317,8 +325,11 @@ export class Visit implements InputOwner {
   }
 
   private noteLag(): void {
-    if (this.answersUs > 0) this.status.lagMs = performance.timeOrigin + performance.now() - this.answersUs / 1000;
-    this.answersUs = 0;
+    if (this.answer === null) return;
+    const now = performance.timeOrigin + performance.now();
+    this.status.lagMs = now - this.answer.sentUs / 1000;
+    this.status.lagStages = {...this.answer.stages, display: now - this.answer.decodedUs / 1000};
+    this.answer = null;
   }
 
   private sendCamera(): void {
@@ -350,7 +361,7 @@ export class Visit implements InputOwner {
     this.panel.update({
       framesPerSecond: moving ? this.timer.framesPerSecond : null, drawMs: this.timer.lastMs, level: this.guard.level,
       bitsPerSecond: span > 0 ? ((last!.bytes - first!.bytes) * 8000) / span : 0, traffic: this.traffic,
-      lagMs: this.status.lagMs, residency: this.residency, error: this.status.error, seconds: now / 1000});
+      lagMs: this.status.lagMs, lagStages: this.status.lagStages, residency: this.residency, error: this.status.error, seconds: now / 1000});
   }
 
   // ---- buttons, keys, the link ---------------------------------------------------------------------------------------

@@ -21,21 +21,51 @@ export type ToWorker =
 /** Why there is no stream. `lost`: it is tried again by itself, as is `full`; the others are final. */
 export type OutReason = 'lost' | 'full' | 'version' | 'refused' | 'fault' | 'decoder';
 
+/** Where the time from a camera to the picture made for it went, milliseconds; what is drawn adds the display. */
+export interface LagStages {
+  /** Up and down: all that no stamp of either end covers. */
+  network: number;
+  /** Until the scheduler took the view up. */
+  wait: number;
+  visibility: number;
+  /** Until a frame was begun. */
+  shading: number;
+  /** Composed and encoded. */
+  encode: number;
+  /** In the session's send queue. */
+  queue: number;
+  /** Decoded, and waiting for that. */
+  decode: number;
+}
+
+/** The camera that a picture answers. */
+export interface Answer {
+  /** When it was sent and when the picture was decoded: microseconds since 1970 by the clock that page and worker share. */
+  sentUs: number;
+  decodedUs: number;
+  stages: LagStages;
+}
+
 export interface Traffic {
   /** Bytes of messages so far, all sessions of this page. */
   received: number;
   /** Of frames and coarse textures alone. */
   stream: number;
+  /** Of manifest and geometry alone. */
+  geometry: number;
+  coarse: number;
   decodeMs: number;
   framesLost: number;
 }
 
 export type FromWorker =
-  | {type: 'joined'; start: Pose; shape: StreamShape; updatesPerSecond: number; server: string; sceneKnown: boolean}
+  | {type: 'joined'; start: Pose; shape: StreamShape; updatesPerSecond: number; server: string; sceneKnown: boolean;
+    /** The first so many chunks hold all that the first view can see. */
+    chunksInView: number}
   | {type: 'scene'; scene: SceneShape}
   | {type: 'chunk'; chunk: Chunk}
   | {type: 'coarse'; picture: Planes}
-  | {type: 'frame'; update: FrameUpdate; answersUs: number; error: number}
-  | {type: 'answer'; answersUs: number; error: number}
+  | {type: 'frame'; update: FrameUpdate; answer: Answer | null; error: number}
+  | {type: 'answer'; error: number}
   | {type: 'traffic'; traffic: Traffic}
   | {type: 'out'; reason: OutReason; text: string; retryMs: number};

@@ -2,11 +2,12 @@
 import {create} from '@bufbuild/protobuf';
 
 import {CameraUpdateSchema, FeedbackSchema, HelloSchema, PoseSchema} from '../gen/darm_pb.js';
-import type {CoarseTexture, SceneManifest, Stamps, StreamFrame, Welcome} from '../gen/darm_pb.js';
+import type {CoarseTexture, SceneManifest, StreamFrame, Welcome} from '../gen/darm_pb.js';
 import {kMaxPhysTex, kMaxViewPhysTex, kProtocolVersion} from '../shared/limits.js';
 import type {FromWorker, OutReason, Pose, Traffic} from '../shared/messages.js';
 import type {SceneShape, StreamShape} from '../shared/scene.js';
 import {BufferPool} from './buffer_pool.js';
+import {answerOf} from './lag.js';
 import {ChunkReader, readManifest, Refused} from './scene_reader.js';
 import {StreamPlayer} from './stream_player.js';
 import type {Body, SocketOwner} from './stream_socket.js';
@@ -37,13 +38,15 @@ export class Session implements SocketOwner {
   private scene: SceneShape | null = null;
   private sceneTag = 0n;
   private chunks: ChunkReader | null = null;
+  private chunksInView = 0;  // still to come
   private player: StreamPlayer | null = null;
   private viewPlayer: StreamPlayer | null = null;
   private sequence = 0n;
   private pose: Pose | null;
   private lastKeyRequest = 0;
   private decodeUs = 0;
-  private readonly traffic: Traffic = {received: 0, stream: 0, decodeMs: 0, framesLost: 0};
+  private readonly traffic: Traffic = {received: 0, stream: 0, geometry: 0, coarse: 0, decodeMs: 0,
+    framesLost: 0};
 
   constructor(url: string, private readonly name: string, private readonly chroma444: boolean, pose: Pose | null,
               private readonly post: Post) {
@@ -65,16 +68,19 @@ export class Session implements SocketOwner {
   message(body: Body, bytes: number): void {
     this.traffic.received += bytes;
     const frame = body.case === 'frame' || body.case === 'viewFrame';
+    if (body.case === 'geometry' || body.case === 'manifest') this.traffic.geometry += bytes;
+    if (body.case === 'coarse') this.traffic.coarse += bytes;
     if (frame || body.case === 'coarse' || body.case === 'noChange') this.traffic.stream += bytes;
     // Left out: a gap, for which a key frame will be asked.
     if (frame && this.framesWaiting >= kMostFramesWaiting && !body.value.key) return;
     if (frame) ++this.framesWaiting;
     const epoch = this.epoch;
+    const receivedUs = sharedNowUs();
     this.work = this.work.then(async () => {
       if (frame) --this.framesWaiting;
       if (epoch !== this.epoch) return;
       try {
-        await this.take(body);
+        await this.take(body, receivedUs);
       } catch (error) {
         this.stop(error);
       }
@@ -122,21 +128,21 @@ export class Session implements SocketOwner {
     }
   }
 
-  private async take(body: Body): Promise<void> {
+  private async take(body: Body, receivedUs: number): Promise<void> {
     switch (body.case) {
       case 'welcome': return this.join(body.value);
       case 'manifest': return this.begin(body.value);
       case 'geometry': {
         if (this.chunks === null) throw new Refused('geometry before the manifest');
         const chunk = this.chunks.read(body.value);
-        if (this.chunks.complete) this.tellTraffic();
+        if (this.chunks.complete || --this.chunksInView === 0) this.tellTraffic();
         return this.post({type: 'chunk', chunk}, [chunk.vertices.buffer, chunk.indices.buffer]);
       }
       case 'coarse': return this.takeCoarse(body.value);
-      case 'frame': return this.takeFrame(this.player, body.value, true);
-      case 'viewFrame': return this.takeFrame(this.viewPlayer, body.value, false);
+      case 'frame': return this.takeFrame(this.player, body.value, true, receivedUs);
+      case 'viewFrame': return this.takeFrame(this.viewPlayer, body.value, false, receivedUs);
       case 'noChange':
-        return this.post({type: 'answer', answersUs: sentAt(body.value.stamps), error: body.value.error});
+        return this.post({type: 'answer', error: body.value.error});
       default:  // a newer server may say more
     }
   }
@@ -155,9 +161,10 @@ export class Session implements SocketOwner {
       orientation: p ? [p.qx, p.qy, p.qz, p.qw] : [0, 0, 0, 1], fovy: p?.fovy ?? 0.8, width: 0, height: 0,
     };
     this.post({type: 'joined', start, shape: this.shape, updatesPerSecond: welcome.updatesPerSecond,
-      server: welcome.server, sceneKnown: welcome.sceneKnown});
+      server: welcome.server, sceneKnown: welcome.sceneKnown, chunksInView: welcome.chunksInView});
+    this.chunksInView = welcome.chunksInView;
     if (welcome.sceneKnown && this.scene !== null) this.makePlayers(this.scene);
-    if (this.pose !== null) this.camera(this.pose, (performance.timeOrigin + performance.now()) * 1000);
+    if (this.pose !== null) this.camera(this.pose, sharedNowUs());
   }
 
   private begin(manifest: SceneManifest): void {
@@ -192,7 +199,8 @@ export class Session implements SocketOwner {
     this.post({type: 'coarse', picture}, [picture.buffer]);
   }
 
-  private async takeFrame(player: StreamPlayer | null, frame: StreamFrame, shared: boolean): Promise<void> {
+  private async takeFrame(player: StreamPlayer | null, frame: StreamFrame, shared: boolean,
+                          receivedUs: number): Promise<void> {
     if (player === null) throw new Refused('a frame of a stream that was not agreed on');
     const before = performance.now();
     const update = await player.apply(frame);
@@ -202,8 +210,8 @@ export class Session implements SocketOwner {
       this.traffic.decodeMs = took;
       const transfer: Transferable[] = update.pages.map((rows) => rows.slots.buffer);
       if (update.picture) transfer.push(update.picture.buffer);
-      this.post({type: 'frame', update, answersUs: shared ? sentAt(frame.stamps) : 0, error: shared ? frame.error : -1},
-                transfer);
+      const answer = shared ? answerOf(frame.stamps, receivedUs, sharedNowUs()) : null;
+      this.post({type: 'frame', update, answer, error: shared ? frame.error : -1}, transfer);
     }
     this.traffic.framesLost = (this.player?.framesLost ?? 0) + (this.viewPlayer?.framesLost ?? 0);
     this.repair();
@@ -227,7 +235,7 @@ export class Session implements SocketOwner {
   }
 }
 
-// When the camera that is answered was sent, by this page's clock; 0: none.
-function sentAt(stamps: Stamps | undefined): number {
-  return Number(stamps?.clientSent ?? 0n);
+// The clock that page and worker share, microseconds.
+function sharedNowUs(): number {
+  return (performance.timeOrigin + performance.now()) * 1000;
 }
