@@ -5,6 +5,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -13,15 +14,16 @@ BIN = Path(os.environ["DARM_BIN"])
 SOURCE = Path(os.environ["DARM_SOURCE"])
 SCENES = Path(os.environ["DARM_SHARED_SCENES"])
 SET_UP = SOURCE / "config/scenes/default.toml"
+sys.path.insert(0, str(SOURCE / "tests/support"))
 
 
 class Daemon:
-    """darmd serve on the default scene, at a low density so that a test takes seconds."""
+    """darmd serve on the default scene, at a low density so that a test takes seconds; `more` may say otherwise."""
 
-    def __init__(self, state_dir, *more, q=16, tcp_port=0):
+    def __init__(self, state_dir, *more, set_up=SET_UP, q=16, tcp_port=0):
         self.log = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen(
-            [BIN / "darmd", "serve", "--config", SET_UP, "--state-dir", state_dir, "--q", str(q), "--address",
+            [BIN / "darmd", "serve", "--config", set_up, "--state-dir", state_dir, "--q", str(q), "--address",
              "127.0.0.1", "--tcp-port", str(tcp_port), "--udp-port", "0", "--metrics-port", "0", "--http-port", "0",
              "--allow-lossless", *more],
             stdout=subprocess.PIPE, stderr=self.log, text=True)
@@ -44,10 +46,10 @@ class Daemon:
         return code
 
 
-def probe(port, out, *more, check=True, camera="hall", size="320x180"):
+def probe(port, out, *more, check=True, camera="hall", size="320x180", set_up=SET_UP):
     """Runs darm-probe to its end; its report as a dict."""
     done = subprocess.run(
-        [BIN / "darm-probe", "--server", f"127.0.0.1:{port}", "--setup", SET_UP, "--camera", camera, "--size", size,
+        [BIN / "darm-probe", "--server", f"127.0.0.1:{port}", "--setup", set_up, "--camera", camera, "--size", size,
          "--out", out, "--json", *more], capture_output=True, text=True, timeout=120)
     if check and done.returncode != 0:
         raise AssertionError("darm-probe: " + done.stderr + done.stdout)

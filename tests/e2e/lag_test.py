@@ -1,0 +1,59 @@
+"""The time from a camera to the picture drawn for it is told by stage, and the stages make up the whole."""
+import unittest
+from pathlib import Path
+
+from running import SOURCE, Daemon, Folder, probe
+
+from slow_link import SlowLink
+
+# What a stage may be under nothing, ms: clocks are read one after another, and the two ways of a ping differ.
+SLACK = 2.0
+
+
+class Lag(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Folder()
+        path = Path(cls.folder.__enter__())
+        cls.daemon = Daemon(path / "state", q=32)
+        cls.out = path / "picture.png"
+        cls.walk = SOURCE / "config/walkthroughs/default.json"
+
+    @classmethod
+    def tearDownClass(cls):
+        code = cls.daemon.stop()
+        cls.folder.__exit__()
+        if code != 0:
+            raise AssertionError(f"the daemon stopped with {code}")
+
+    def lag(self, port, *more):
+        report = probe(port, self.out, "--walkthrough", self.walk, "--seconds", "8", "--lag", *more, size="320x180")
+        lag = report["lag_ms"]
+        print({name: round(stage["mean"], 2) for name, stage in lag["stages"].items()}, "of", round(lag["mean"], 2))
+        self.assertGreater(lag["samples"], 5)
+        self.assertLess(abs(lag["sum_over_whole"] - 1), 0.05)
+        self.assertLessEqual(lag["p50"], lag["p99"])
+        for name, stage in lag["stages"].items():
+            self.assertGreater(stage["mean"], -SLACK, name)
+            self.assertLess(stage["mean"], lag["mean"] + SLACK, name)
+        for name in ("visibility", "encode", "decode", "display"):
+            self.assertGreater(lag["stages"][name]["mean"], 0, name)
+        return lag
+
+    def test_stages_add_up_to_the_whole(self):
+        self.lag(self.daemon.tcp)
+
+    def test_a_slow_line_is_found_where_it_is(self):
+        link = SlowLink(self.daemon.tcp, mbit=20, rtt_ms=200)
+        lag = self.lag(link.port, "--no-udp")
+        link.stop()
+        for name in ("network_up", "network_down"):
+            self.assertGreater(lag["stages"][name]["p50"], 60, name)
+        self.assertGreater(lag["p50"], 200)
+
+    def test_without_being_asked_nothing_is_told(self):
+        self.assertIsNone(probe(self.daemon.tcp, self.out, "--seconds", "2", size="160x90")["lag_ms"])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
