@@ -147,7 +147,7 @@ TEST(H264Encoder, a_still_picture_comes_nearer_as_quality_rises) {
     const auto shown = decoder.decode(encoder->encode(grain.view(), key).value());
     double squares = 0;
     for (std::size_t i = 0; i < shown.plane[0].size(); ++i)
-      squares += std::pow(double{shown.plane[0][i]} - double{grain.view().plane[0][i]}, 2);
+      squares += std::pow(double(shown.plane[0][i]) - double(grain.view().plane[0][i]), 2);
     return std::sqrt(squares / static_cast<double>(shown.plane[0].size()));
   };
   const double first = off(true);
