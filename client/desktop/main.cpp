@@ -7,6 +7,7 @@
 #include <iostream>
 #include <map>
 
+#include "client/core/number_option.hpp"
 #include "client/desktop/view_link.hpp"
 #include "client/desktop/viewer.hpp"
 
@@ -58,20 +59,6 @@ Result<VisitPlan> make_plan(const Arguments& a) {
   return plan;
 }
 
-// CLI::Range lets NaN through.
-CLI::Validator number(double low, double high) {
-  const auto range = fmt::format("{} to {}", low, high);
-  return {[low, high, range](std::string& text) {
-            double value = 0;
-            const char* last = text.data() + text.size();
-            const auto [end, error] = std::from_chars(text.data(), last, value);
-            return error == std::errc() && end == last && value >= low && value <= high
-                       ? std::string()
-                       : "'" + text + "' is not a number, " + range;
-          },
-          range};
-}
-
 void declare(CLI::App& app, Arguments& a) {
   app.add_option("server", a.server, "HOST:PORT of darmd's TCP port")->required();
   app.add_option("--camera", a.camera,
@@ -83,8 +70,9 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_flag("--insecure", a.insecure, "speak TLS with whoever answers");
   app.add_flag("--panel", a.panel, "show the measurements from the start");
   app.add_flag("--bare", a.bare, "show nothing but the scene");
-  app.add_option("--turn", a.turn, "degrees a second by which the view turns by itself")->check(number(-360, 360));
-  app.add_option("--after", a.after, "leave after so many seconds")->check(number(0, kLongest));
+  app.add_option("--turn", a.turn, "degrees a second by which the view turns by itself")
+      ->check(number_option(-360, 360));
+  app.add_option("--after", a.after, "leave after so many seconds")->check(number_option(0, kLongest));
   app.add_option("--screenshot", a.screenshot, "with --after: PNG of the scene, written on leaving");
   app.add_option("--report", a.report, "JSON of frames a second and times, written on leaving; -: standard output");
   app.add_flag("--no-vsync", a.no_vsync, "draw as fast as it goes, to measure");

@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "client/core/egl_context.hpp"
+#include "client/core/number_option.hpp"
 #include "client/probe/camera_path.hpp"
 #include "client/probe/probe_session.hpp"
 #include "client/probe/report.hpp"
@@ -17,20 +18,6 @@ namespace {
 
 constexpr double kLongest = 1e6;  // seconds
 constexpr unsigned kLargestSide = 8192;
-
-// A finite number from `low` to `high`. CLI::Range lets NaN through.
-CLI::Validator number(double low, double high) {
-  const auto range = fmt::format("{} to {}", low, high);
-  return {[low, high, range](std::string& text) {
-            double value = 0;
-            const char* last = text.data() + text.size();
-            const auto [end, error] = std::from_chars(text.data(), last, value);
-            const bool in_range = value >= low && value <= high;  // false for NaN
-            return error == std::errc() && end == last && in_range ? std::string()
-                                                                   : "'" + text + "' is not a number, " + range;
-          },
-          range};
-}
 
 // Refused before the session, not after.
 const CLI::Validator kWritablePlace(
@@ -214,17 +201,17 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--size", a.size, "picture, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--seconds", a.seconds,
                  "stop after so long (default 10, a walkthrough's length; the limit of --until-error: 120)")
-      ->check(number(0, kLongest));
+      ->check(number_option(0, kLongest));
   app.add_option("--until-error", a.until_error,
                  "stop once the server's estimated RMS display error is at most this, 0..1")
-      ->check(number(0, 1));
+      ->check(number_option(0, 1));
   app.add_option("--target-error", a.target_error,
                  "ask the server to compute until this RMS display error, 0..1; 0: its own target")
-      ->check(number(0, 1));
+      ->check(number_option(0, 1));
   app.add_option("--reference", a.reference, "BASE.pfm with its halves BASE.a.pfm and BASE.b.pfm beside it");
   app.add_option("--ceiling-seconds", a.ceiling_seconds,
                  "then open a lossless session at the same camera for so long and score it as the ceiling")
-      ->check(number(0, kLongest));
+      ->check(number_option(0, kLongest));
   app.add_option("--ceiling-phystex", a.ceiling_phystex, "PhysTex of that session, pixels")->capture_default_str();
   app.add_option("--ceiling", a.ceiling, "picture of the ceiling: read if it is there, else written")
       ->check(kWritablePlace);
@@ -242,10 +229,10 @@ void declare(CLI::App& app, Arguments& a) {
       ->capture_default_str();
   app.add_option("--updates-per-second", a.updates_per_second, "cameras sent, also when still")
       ->capture_default_str()
-      ->check(number(0.1, 240));
+      ->check(number_option(0.1, 240));
   app.add_option("--series-interval", a.series_interval,
                  "seconds between points of the series (default: 1, 2, 5, 10, 20, 30, 60, ...)")
-      ->check(number(0, kLongest));
+      ->check(number_option(0, kLongest));
   app.add_flag("--codec-check", a.codec_check,
                "then compare each tile with a lossless session's: PSNR of PhysTex after the codec (a lower bound)");
   app.add_option("--bench-draw", a.bench_draw, "draw so many pictures at the end to measure frames/s");
