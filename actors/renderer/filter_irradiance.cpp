@@ -70,7 +70,7 @@ void IrradianceFilter::filter_rows(const FilterWindow& w) {
       const int reach = std::min(reach_of(first), w.radius);
       LineFits fits(centres_at(w, first), with_slope_);
       bool any = false;
-      const auto add = [&](int distance) {
+      fits.along(reach, [&](int distance) {
         const std::size_t q = first + static_cast<std::size_t>(distance);
         if (lit_[q] == 0) return;
         any = true;
@@ -81,13 +81,7 @@ void IrradianceFilter::filter_rows(const FilterWindow& w) {
                   {load(&w.irradiance[0][q]), load(&w.irradiance[1][q]), load(&w.irradiance[2][q])},
                   load(&variance_[q])},
                  static_cast<float>(distance));
-      };
-      add(0);
-      for (int d = 1; d <= reach; ++d) {
-        fits.step();
-        add(d);
-        add(-d);
-      }
+      });
       if (!any) continue;
       filled_[static_cast<std::size_t>(y * kBlocks + b)] = 1;
       fits.solve(&w.count[first], block(y, b));
@@ -102,7 +96,7 @@ void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<Filtere
       const int reach = std::min(reach_of(first), w.radius);
       LineFits fits(centres_at(w, first), with_slope_);
       bool any = false;
-      const auto add = [&](int distance) {
+      fits.along(reach, [&](int distance) {
         const int v = y + w.radius + distance;
         if (filled_[static_cast<std::size_t>(v * kBlocks + b)] == 0) return;
         any = true;
@@ -111,13 +105,7 @@ void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<Filtere
         fits.add({load(&w.patch[q]), load(&statistics_.mean()[q]), load(&statistics_.variance()[q]), row.weight,
                   row.value, row.noise},
                  static_cast<float>(distance));
-      };
-      add(0);
-      for (int d = 1; d <= reach; ++d) {
-        fits.step();
-        add(d);
-        add(-d);
-      }
+      });
       if (!any) continue;
       fits.solve(&w.count[first], fitted);
       for (std::size_t x = 0; x < kLanes; ++x) {

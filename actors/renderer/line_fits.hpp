@@ -67,20 +67,31 @@ class LineFits {
   LineFits(const FitCentres& centres, bool with_slope)
       : centres_(centres), with_slope_(with_slope), ratio_(centres.first), square_(centres.first * centres.first) {}
 
-  /// The Gaussian's value at the next distance, 0 where that is under its least. g(d + 1) = g(d) ratio(d),
-  /// ratio(d + 1) = ratio(d) g(1)^2, from ratio(0) = g(1).
-  void step() {
-    const Lanes next = gaussian_ * ratio_;
-    gaussian_ = next >= kLeastGaussian ? next : Lanes{};
-    ratio_ *= square_;
+  /// Calls `add_at(distance)` for 0, 1, -1, ... `reach`, -`reach`, which may add() the texels there.
+  template <class AddAt>
+  void along(int reach, const AddAt& add_at) {
+    add_at(0);
+    for (int d = 1; d <= reach; ++d) {
+      step();
+      add_at(d);
+      add_at(-d);
+    }
   }
-  /// Texels `distance` away, of as many steps.
+  /// Within along() only: texels at the distance it is at.
   void add(const FitTexels& texels, float distance);
   /// `samples` a texel: few say little of their noise.
   void solve(const float* samples, Fitted& out) const;
 
  private:
   static constexpr float kLeastGaussian = 0.02f;
+
+  // The Gaussian's value at the next distance, 0 where that is under its least. g(d + 1) = g(d) ratio(d),
+  // ratio(d + 1) = ratio(d) g(1)^2, from ratio(0) = g(1).
+  void step() {
+    const Lanes next = gaussian_ * ratio_;
+    gaussian_ = next >= kLeastGaussian ? next : Lanes{};
+    ratio_ *= square_;
+  }
 
   FitCentres centres_;
   bool with_slope_;
