@@ -303,7 +303,7 @@ void Viewer::obey(Action action) {
 void Viewer::save_picture() {
   if (saving_.valid() || !stage_.ready()) return;
   auto picture = stage_.renderer().read_picture();
-  if (!picture) return;
+  if (!picture) return stream_->say(picture.error().message, now_ms(), 4);
   saving_ = std::async(std::launch::async, [image = std::move(*picture)] {
     const std::string name = picture_name();
     const auto written = write_png(name, image);
