@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr double kReferencePsnr = 40;  // target + 8 dB and some
-constexpr double kSettledSeconds = 8;  // until every tile of a view is in the stream again
+constexpr double kSettledSeconds =
+    8;  // until every tile of a view is in the stream again, and coded as finely as it will be
 
 client::View to_view(const Camera& camera, const TimeToQualityOptions& options) {
   client::View view;
