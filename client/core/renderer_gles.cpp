@@ -445,12 +445,14 @@ Result<void> GlesRenderer::draw(const SceneModel& scene, const View& view) {
   return {};
 }
 
-void GlesRenderer::present(std::uint32_t framebuffer) {
+void GlesRenderer::present(std::uint32_t framebuffer, std::uint32_t width, std::uint32_t height) {
   const gles::Target& picture = state_->picture;
   const auto w = static_cast<GLint>(picture.width()), h = static_cast<GLint>(picture.height());
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture.framebuffer());
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
-  glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  const bool as_it_is = picture.width() == width && picture.height() == height;
+  glBlitFramebuffer(0, 0, w, h, 0, 0, static_cast<GLint>(width), static_cast<GLint>(height), GL_COLOR_BUFFER_BIT,
+                    as_it_is ? GL_NEAREST : GL_LINEAR);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
 }
 

@@ -48,8 +48,9 @@ class GlesRenderer {
   }
   /// Draws into a picture of view.width x view.height for read_picture() and present().
   [[nodiscard]] Result<void> draw(const SceneModel& scene, const View& view);
-  /// Copies the last picture to a framebuffer (0: the window's) of at least its size.
-  void present(std::uint32_t framebuffer);
+  /// Copies the last picture to the lower left `width` x `height` pixels of a framebuffer (0: the window's), enlarged
+  /// if it has fewer.
+  void present(std::uint32_t framebuffer, std::uint32_t width, std::uint32_t height);
   [[nodiscard]] Result<Image8> read_picture();
   /// Draws the view once more to count classes. `coarseness` 0: every sample (4 a pixel), expensive, for reports;
   /// n: one sample for n x n pixels. The picture stays.

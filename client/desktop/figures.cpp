@@ -81,7 +81,8 @@ PanelLines panel_lines(const Measured& m) {
   if (m.seconds > 5)
     cost += fmt::format(" ({} an hour)", bytes_text(static_cast<double>(m.traffic.received) / m.seconds * 3600));
   cost += fmt::format(", ms: decoding {:.0f}, uploading {:.0f}, drawing {:.0f}", m.decode_ms, m.upload_ms, m.draw_ms);
-  return {{"Frames a second", m.frames_per_second ? fmt::format("{:.0f}", *m.frames_per_second) : "still"},
+  const char* coarser = m.divisor > 1 ? ", coarser" : "";
+  return {{"Frames a second", m.frames_per_second ? fmt::format("{:.0f}{}", *m.frames_per_second, coarser) : "still"},
           {"Stream", rate_text(m.bits_per_second)},
           {"Shading lag", m.lag_ms ? fmt::format("{:.0f} ms", *m.lag_ms) : "-"},
           {"Coarser than asked", fallback ? fmt::format("{:.1f} %", *fallback * 100) : "-"},
@@ -107,6 +108,7 @@ std::string report_json(const VisitFigures& f, const Measured& last) {
   j["error"] = optional(last.error);
   j["fallback"] = optional(last.residency ? fallback_share(*last.residency) : std::nullopt);
   j["size"] = {f.width, f.height};
+  j["guard_divisor"] = f.coarsest;
   j["device"] = f.device;
   return j.dump(2);
 }

@@ -51,6 +51,7 @@ struct Traffic {
 struct Measured {
   std::optional<double> frames_per_second;  ///< drawn while something moves; nothing: still
   double draw_ms = 0, upload_ms = 0, decode_ms = 0;
+  std::uint32_t divisor = 1;  ///< of the frame-rate guard: the window's pixels over the picture's, on a side
   double bits_per_second = 0;
   Traffic traffic;
   std::optional<double> lag_ms;  ///< from a camera sent until a picture made for it was drawn
@@ -77,7 +78,8 @@ struct VisitFigures {
   std::uint64_t stream_frames = 0;
   unsigned joins = 0;
   std::uint32_t width = 0, height = 0;
-  std::string device;  ///< the GL that drew
+  std::uint32_t coarsest = 1;  ///< largest divisor of the frame-rate guard since the first whole picture
+  std::string device;          ///< the GL that drew
 };
 [[nodiscard]] std::string report_json(const VisitFigures& figures, const Measured& last);
 

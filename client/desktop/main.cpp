@@ -8,6 +8,7 @@
 #include <map>
 
 #include "client/core/number_option.hpp"
+#include "client/core/tls_options.hpp"
 #include "client/desktop/view_link.hpp"
 #include "client/desktop/viewer.hpp"
 
@@ -18,9 +19,10 @@ constexpr int kLargestSide = 8192;
 constexpr double kLongest = 1e7;  // seconds
 
 struct Arguments {
-  std::string server, camera, size = "1280x720", screenshot, report, authority;
+  std::string server, camera, size = "1280x720", screenshot, report;
+  TlsOptions tls;
   double after = -1, turn = 0;
-  bool tls = false, insecure = false, panel = false, bare = false, no_vsync = false;
+  bool panel = false, bare = false, no_vsync = false, finest = false;
   GlKind gl = GlKind::kAuto;
 };
 
@@ -38,12 +40,13 @@ Result<VisitPlan> make_plan(const Arguments& a) {
   VisitPlan plan;
   plan.server.name = "darm-view 0.1.0";
   if (auto ok = parse_address(a.server, plan.server.host, plan.server.port); !ok) return std::unexpected(ok.error());
-  if (a.tls || a.insecure || !a.authority.empty()) plan.server.tls = a.insecure ? Tls::kUnverified : Tls::kVerified;
-  plan.server.authority = a.authority;
+  plan.server.tls = a.tls.wanted();
+  plan.server.authority = a.tls.authority;
   if (auto ok = read_size(a.size, plan.window); !ok) return std::unexpected(ok.error());
   plan.window.title = "DARM - " + a.server;
   plan.window.gl = a.gl;
   plan.window.vsync = !a.no_vsync;
+  plan.finest = a.finest;
   if (!a.camera.empty()) {
     const auto view = read_view(a.camera);
     if (!view) return std::unexpected(view.error());
@@ -64,10 +67,7 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--camera", a.camera,
                  "where to begin: \"px,py,pz tx,ty,tz fovy_degrees\", or a link to a view (#view=...)");
   app.add_option("--size", a.size, "inside of the window, WIDTHxHEIGHT")->capture_default_str();
-  app.add_flag("--tls", a.tls, "speak TLS; the certificate must be vouched for");
-  app.add_option("--authority", a.authority, "PEM file that vouches too, e.g. darmd's STATE-DIR/tls/certificate.pem")
-      ->check(CLI::ExistingFile);
-  app.add_flag("--insecure", a.insecure, "speak TLS with whoever answers");
+  a.tls.declare(app);
   app.add_flag("--panel", a.panel, "show the measurements from the start");
   app.add_flag("--bare", a.bare, "show nothing but the scene");
   app.add_option("--turn", a.turn, "degrees a second by which the view turns by itself")
@@ -75,6 +75,7 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--after", a.after, "leave after so many seconds")->check(number_option(0, kLongest));
   app.add_option("--screenshot", a.screenshot, "with --after: PNG of the scene, written on leaving");
   app.add_option("--report", a.report, "JSON of frames a second and times, written on leaving; -: standard output");
+  app.add_flag("--finest", a.finest, "never draw coarser to keep up with the hand");
   app.add_flag("--no-vsync", a.no_vsync, "draw as fast as it goes, to measure");
   app.add_option("--gl", a.gl, "what to draw with: auto, es (OpenGL ES 3), desktop (OpenGL 3.3)")
       ->transform(CLI::CheckedTransformer(

@@ -71,7 +71,7 @@ void Stage::present(const PixelSize& size) {
   glViewport(0, 0, static_cast<GLsizei>(size.width), static_cast<GLsizei>(size.height));
   glClearColor(0, 0, 0, 1);
   glClear(GL_COLOR_BUFFER_BIT);
-  if (renderer_ && drawn_) renderer_->present(0);
+  if (renderer_ && drawn_) renderer_->present(0, size.width, size.height);
 }
 
 }  // namespace darm::client::desktop

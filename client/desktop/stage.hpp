@@ -18,7 +18,8 @@ class Stage {
   /// Draws the picture and waits until the GL is done with it. Nothing to draw yet is no error: see ready().
   [[nodiscard]] Result<void> draw(const View& view);
 
-  /// Copies the last picture, or none yet in black, to the window's framebuffer of `size`.
+  /// Copies the last picture, enlarged to `size` if it was drawn smaller, or black before there is one, to the window's
+  /// framebuffer of that size.
   void present(const PixelSize& size);
 
   [[nodiscard]] bool ready() const { return renderer_ != nullptr; }

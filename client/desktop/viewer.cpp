@@ -14,6 +14,7 @@
 
 #include "client/core/picture_files.hpp"
 #include "client/desktop/controls.hpp"
+#include "client/desktop/frame_guard.hpp"
 #include "client/desktop/live_stream.hpp"
 #include "client/desktop/overlay.hpp"
 #include "client/desktop/pick.hpp"
@@ -27,6 +28,7 @@ namespace {
 
 constexpr double kPanelEveryMs = 500;
 constexpr double kLongestWaitMs = 250;
+constexpr double kRefineAfterMs = 50;          // how often it is asked whether a view drawn coarsely has come to rest
 constexpr std::uint32_t kCountCoarseness = 8;  // residency is counted on one sample for so many pixels on a side
 
 double now_ms() { return static_cast<double>(now_us()) / 1000; }
@@ -46,9 +48,10 @@ class Viewer {
   void take_answer();
   void note_lag(double ms);
   void follow(const Arrivals& arrivals);
-  Result<void> draw();
+  Result<void> draw(std::uint32_t divisor);
   Result<void> draw_if_due();
-  void note_drawn(double begin, double end);
+  void note_drawn(double begin, double end, std::uint32_t divisor);
+  [[nodiscard]] bool refinable(double now) const { return drawn_divisor_ > 1 && !pace_.moving(now); }
   Result<void> present();
   Result<void> refresh_panel();
   void obey(Action action);
@@ -66,6 +69,8 @@ class Viewer {
   std::unique_ptr<Overlay> overlay_;
   std::unique_ptr<LiveStream> stream_;
   RedrawPace pace_;
+  FrameGuard guard_;
+  std::uint32_t drawn_divisor_ = 1;  // of the picture that is there
   OverlayShow show_;
   PixelSize size_;
   std::future<std::string> saving_;  // what there is to say of a picture once it is written
@@ -110,6 +115,7 @@ double Viewer::patience() const {
   double wait = controls_->restless() || plan_.turn != 0 ? 0 : kLongestWaitMs;
   if (size_.width == 0) return kLongestWaitMs;  // iconified: nothing is drawn
   wait = std::min(wait, pace_.wait(now));
+  if (drawn_divisor_ > 1) wait = std::min(wait, kRefineAfterMs);
   if (show_.panel && !show_.bare) wait = std::min(wait, panel_ms_ + kPanelEveryMs - now);
   return wait;
 }
@@ -191,21 +197,25 @@ Result<void> Viewer::take_arrivals() {
   return {};
 }
 
-Result<void> Viewer::draw() {
+Result<void> Viewer::draw(std::uint32_t divisor) {
   if (auto ok = take_arrivals(); !ok) return ok;
   const double begin = now_ms();
-  if (auto ok = stage_.draw(view()); !ok) return ok;
-  note_drawn(begin, now_ms());
+  const auto side = [divisor](std::uint32_t pixels) { return std::max(1u, pixels / divisor); };
+  if (auto ok = stage_.draw(to_view(rig_.view, side(size_.width), side(size_.height))); !ok) return ok;
+  note_drawn(begin, now_ms(), divisor);
   return {};
 }
 
 Result<void> Viewer::draw_if_due() {
-  if (size_.width == 0 || !pace_.due(now_ms())) return {};
-  return draw();
+  const double now = now_ms();
+  if (size_.width == 0 || !(pace_.due(now) || refinable(now))) return {};
+  return draw(pace_.moving(now) && !plan_.finest ? guard_.divisor() : 1);
 }
 
-void Viewer::note_drawn(double begin, double end) {
+void Viewer::note_drawn(double begin, double end, std::uint32_t divisor) {
   pace_.drawn(begin, end);
+  if (pace_.moving(begin) && stage_.whole()) guard_.drawn(divisor, end - begin);
+  drawn_divisor_ = divisor;
   drew_ = true;
   if (!stage_.ready()) return;
   if (answers_us_ > 0) note_lag(end - static_cast<double>(std::exchange(answers_us_, 0)) / 1000);
@@ -215,6 +225,7 @@ void Viewer::note_drawn(double begin, double end) {
     ++figures_.frames_drawn;
     if (!stream_->connected()) ++figures_.frames_drawn_alone;
     figures_.draw_ms.add(end - begin);
+    figures_.coarsest = std::max(figures_.coarsest, divisor);
   } else if (stage_.whole()) {
     whole_ms_ = end;
     figures_.first_picture_seconds = (end - start_ms_) / 1000;
@@ -222,6 +233,7 @@ void Viewer::note_drawn(double begin, double end) {
     figures_.upload_ms = Series();  // those of geometry are no frame's
   }
   measured_.draw_ms = end - begin;
+  measured_.divisor = divisor;
 }
 
 Result<void> Viewer::refresh_panel() {
@@ -302,6 +314,9 @@ void Viewer::obey(Action action) {
 // Compressing takes longer than a frame may.
 void Viewer::save_picture() {
   if (saving_.valid() || !stage_.ready()) return;
+  if (drawn_divisor_ > 1) {
+    if (auto ok = draw(1); !ok) return stream_->say(ok.error().message, now_ms(), 4);
+  }
   auto picture = stage_.renderer().read_picture();
   if (!picture) return stream_->say(picture.error().message, now_ms(), 4);
   saving_ = std::async(std::launch::async, [image = std::move(*picture)] {
@@ -314,7 +329,7 @@ void Viewer::save_picture() {
 Result<void> Viewer::leave() {
   if (saving_.valid()) saving_.wait();
   if (time_over() && !plan_.screenshot.empty()) {
-    if (auto ok = draw(); !ok) return ok;
+    if (auto ok = draw(1); !ok) return ok;
     if (!stage_.whole()) {
       const Notice notice = stream_->words(now_ms());
       return fail(fmt::format("no whole picture in {} s: {}", *plan_.seconds,

@@ -16,6 +16,7 @@ struct VisitPlan {
   std::optional<UprightView> view;   ///< where to begin; nothing: where the scene says
   bool panel = false;                ///< measurements shown from the start
   bool bare = false;                 ///< nothing over the picture
+  bool finest = false;               ///< no frame-rate guard: each picture has all the window's pixels
   double turn = 0;                   ///< degrees a second by which the view turns by itself
   std::optional<double> seconds;     ///< leave after so long
   std::filesystem::path screenshot;  ///< PNG written on leaving after `seconds`; empty: none
