@@ -9,6 +9,7 @@
 
 #include "client/core/egl_context.hpp"
 #include "client/core/number_option.hpp"
+#include "client/core/tls_options.hpp"
 #include "client/probe/camera_path.hpp"
 #include "client/probe/probe_session.hpp"
 #include "client/probe/report.hpp"
@@ -42,6 +43,7 @@ Result<void> parse_size(const std::string& text, std::uint32_t& width, std::uint
 
 struct Arguments {
   std::string server, camera, setup, size = "1280x720", walkthrough, reference, out, ceiling;
+  TlsOptions tls;
   double until_error = -1, target_error = 0, seconds = -1, ceiling_seconds = 0, series_interval = 0,
          updates_per_second = 10;
   std::uint32_t phystex = 2048, ceiling_phystex = 8192, view_phystex = 1024;
@@ -76,6 +78,8 @@ Result<SessionPlan> make_plan(const Arguments& a) {
   SessionPlan plan;
   if (auto ok = parse_address(a.server, plan.host, plan.port); !ok) return std::unexpected(ok.error());
   if (auto ok = parse_size(a.size, plan.width, plan.height); !ok) return std::unexpected(ok.error());
+  plan.tls = a.tls.wanted();
+  plan.authority = a.tls.authority;
   plan.updates_per_second = a.updates_per_second;
   plan.seconds = a.seconds;
   if (a.until_error >= 0) {
@@ -194,6 +198,7 @@ Result<void> run(const Arguments& a) {
 
 void declare(CLI::App& app, Arguments& a) {
   app.add_option("--server", a.server, "HOST:PORT of darmd's TCP port")->required();
+  a.tls.declare(app);
   app.add_option("--camera", a.camera, "\"px,py,pz tx,ty,tz fovy_degrees\", or a name of --setup");
   app.add_option("--setup", a.setup, "set-up file with [[cameras]], e.g. config/scenes/sponza.toml");
   app.add_option("--walkthrough", a.walkthrough,

@@ -377,6 +377,8 @@ Result<SessionReport> Run::execute(unsigned bench_draws) {
   ConnectOptions options;
   options.host = plan_.host;
   options.port = plan_.port;
+  options.tls = plan_.tls;
+  options.authority = plan_.authority;
   options.name = "darm-probe";
   options.view = view_now();
   options.max_phystex = plan_.max_phystex;

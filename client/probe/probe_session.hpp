@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/core/byte_stream.hpp"
 #include "client/core/connection.hpp"
 #include "client/core/image_metrics.hpp"
 #include "client/core/renderer_gles.hpp"
@@ -19,7 +20,9 @@ namespace darm::client::probe {
 struct SessionPlan {
   std::string host;
   std::uint16_t port = 0;
-  std::vector<CameraKey> path;  ///< one entry: a still camera; more: a walkthrough, begun at the first image
+  Tls tls = Tls::kNone;
+  std::filesystem::path authority;  ///< as ConnectOptions has them
+  std::vector<CameraKey> path;      ///< one entry: a still camera; more: a walkthrough, begun at the first image
   std::uint32_t width = 1280, height = 720;
   double updates_per_second = 10;
   double seconds = 60;                ///< longest time, from the connection (still) or the first image (walkthrough)

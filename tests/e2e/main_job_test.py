@@ -66,6 +66,13 @@ class MainJob(unittest.TestCase):
         self.assertGreater(self.metric("darm_view_error_count"), 0)
         self.assertIsNotNone(self.metric("darm_views_on_target"))
 
+    def test_tls_is_spoken_with_a_server_that_is_vouched_for(self):
+        with self.assertRaisesRegex(AssertionError, "certificate"):
+            probe(self.daemon.tcp, self.out, "--seconds", "1", "--tls", size="160x90")
+        known = probe(self.daemon.tcp, self.out, "--seconds", "2", "--authority",
+                      self.out.parent / "state" / "tls" / "certificate.pem", size="160x90")
+        self.assertGreater(known["frames"], 0)
+
     def test_a_client_that_vanishes_leaves_nothing_behind(self):
         client = subprocess.Popen(
             [BIN / "darm-probe", "--server", f"127.0.0.1:{self.daemon.tcp}", "--camera", "0,1.7,0 1,1.7,0 60", "--size",
