@@ -19,9 +19,11 @@ export const setUp = join(source, 'config/scenes/default.toml');
 const kFlags = ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
   '--disable-component-update', '--disable-sync'];
 
-// Daemons that a failed test has left: they would keep this process waiting.
+// Daemons that a failed test has left: they would keep this process waiting. A bench has no test to come after.
 const left = new Set();
-after(() => left.forEach((child) => child.kill('SIGKILL')));
+const killThem = () => left.forEach((child) => child.kill('SIGKILL'));
+if (process.env.NODE_TEST_CONTEXT) after(killThem);
+else process.on('exit', killThem);
 
 export function folder() {
   const path = mkdtempSync(join(tmpdir(), 'darm-browser-'));
@@ -32,10 +34,10 @@ export function browse(...flags) {
   return chromium.launch({executablePath: process.env.DARM_CHROMIUM, headless: true, args: [...kFlags, ...flags]});
 }
 
-/** darmd serve on the default scene; `web` is its port. */
-export async function serve(state, {port = 0, more = []} = {}) {
+/** darmd serve, on the default scene if no other is named; `web` is its port. */
+export async function serve(state, {port = 0, config = setUp, more = []} = {}) {
   const child = spawn(join(process.env.DARM_BIN, 'darmd'),
-    ['serve', '--config', setUp, '--state-dir', state, '--address', '127.0.0.1', '--tcp-port', '0', '--udp-port', '0',
+    ['serve', '--config', config, '--state-dir', state, '--address', '127.0.0.1', '--tcp-port', '0', '--udp-port', '0',
       '--metrics-port', '-1', '--http-port', String(port), ...more], {stdio: ['ignore', 'pipe', 'pipe']});
   left.add(child);
   let log = '';
@@ -132,9 +134,9 @@ export function probe(port, camera, size, seconds, reference, state) {
   });
 }
 
-/** The link of a named camera of the default set-up. */
-export function linkOf(camera) {
-  const text = readFileSync(setUp, 'utf8');
+/** The link of a named camera of a set-up. */
+export function linkOf(camera, config = setUp) {
+  const text = readFileSync(config, 'utf8');
   const block = text.split('[[cameras]]').find((part) => part.includes(`name = "${camera}"`));
   const vector = (key) => new RegExp(`${key} = \\[([^\\]]*)\\]`).exec(block)[1].split(',').map(Number);
   const fovy = Number(/fovy = ([\d.]+)/.exec(block)[1]);

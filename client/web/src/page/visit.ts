@@ -41,6 +41,16 @@ export interface Status {
   residency: Residency | null;
   /** Bytes of messages so far. */
   received: number;
+  /** Milliseconds of the newest picture and of the newest frame of the stream; `level` is the frame-rate guard's. */
+  cost: Cost;
+}
+
+export interface Cost {
+  drawMs: number;
+  decodeMs: number;
+  /** Until the GL had copied planes, slots and table rows; what it then does with them is in the next `drawMs`. */
+  uploadMs: number;
+  level: number;
 }
 
 export class Visit implements InputOwner {
@@ -74,7 +84,8 @@ export class Visit implements InputOwner {
   private residency: Residency | null = null;
   private status: Status = {firstPictureMs: null, bytesToFirstPicture: null, firstPictureBytes: null, framesDrawn: 0, streamFrames: 0,
     finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, lagMs: null, lagStages: null, residency: null,
-    received: 0};
+    received: 0, cost: {drawMs: 0, decodeMs: 0, uploadMs: 0, level: 0}};
+  private uploadMs = 0;
   private shownFrame = 0;
   private linkTimer = 0;
 
@@ -104,7 +115,7 @@ export class Visit implements InputOwner {
     });
     canvas.addEventListener('webglcontextrestored', () => this.restore());
     Object.assign(window, {darm: {status: (): Status => ({...this.status, view: this.rig.view, mode: this.rig.mode,
-      residency: this.residency, received: this.traffic.received})}});
+      residency: this.residency, received: this.traffic.received, cost: this.cost()})}});
     for (const message of early) this.take(message);
     worker.onmessage = (event: MessageEvent<FromWorker>) => this.take(event.data);
     this.wake();
@@ -208,7 +219,9 @@ export class Visit implements InputOwner {
   }
 
   private takeFrame(update: FrameUpdate, answer: Answer | null, error: number): void {
+    const before = performance.now();
     this.renderer?.apply(update);
+    this.uploadMs = performance.now() - before;
     if (update.picture !== null) this.say({type: 'recycle', buffer: update.picture.buffer}, [update.picture.buffer]);
     if (update.layer === 'shared') this.shownFrame = update.frame;
     ++this.status.streamFrames;
@@ -322,6 +335,10 @@ export class Visit implements InputOwner {
       this.say({type: 'shown', frame: this.shownFrame, drawUs: this.timer.lastMs * 1000});
       this.shownFrame = 0;
     }
+  }
+
+  private cost(): Cost {
+    return {drawMs: this.timer.lastMs, decodeMs: this.traffic.decodeMs, uploadMs: this.uploadMs, level: this.guard.level};
   }
 
   private noteLag(): void {
