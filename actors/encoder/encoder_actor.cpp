@@ -135,7 +135,8 @@ void EncoderActor::on(PictureEncoded&& event) {
   key_required_ = !job->error.empty();
   record(*job);
   if (job->error.empty()) publish(*job);
-  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled));
+  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled,
+                                            job->encoded - job->started));
   while (!job_ && !waiting_.empty()) {
     auto next = std::move(waiting_.front());
     waiting_.pop_front();

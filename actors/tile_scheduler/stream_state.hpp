@@ -66,6 +66,9 @@ class StreamState {
   [[nodiscard]] bool in_flight() const { return in_flight_ != 0; }
   [[nodiscard]] bool has_answers() const { return !answers_.empty(); }
   [[nodiscard]] FrameNumber last_frame() const { return last_frame_; }
+  [[nodiscard]] bool key_due() const { return key_pending_; }
+  /// When the last frame was given out; 0: none was.
+  [[nodiscard]] Microseconds last_frame_at() const { return sent_at_; }
 
  private:
   void write_slot(encoder::ComposeFrame& frame, SlotIndex slot, const StoredImage& image);

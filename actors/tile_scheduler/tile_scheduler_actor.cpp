@@ -24,7 +24,10 @@ bool same_view(const ViewChanged& a, const ViewChanged& b) {
 void post_step(runtime::Executor& executor, std::shared_ptr<ViewJob> job, unsigned slice,
                runtime::Ref<tile_scheduler::Inbox> scheduler) {
   executor.post(runtime::Priority::kHigh, [&executor, job = std::move(job), slice, scheduler = std::move(scheduler)] {
+    const auto begin = executor.now();
     const auto step = job->run_step(slice);
+    const auto took = std::chrono::duration_cast<std::chrono::microseconds>(executor.now() - begin);
+    job->note_busy(took.count());
     if (step == ViewJob::Step::kMore) post_step(executor, job, slice, scheduler);
     if (step == ViewJob::Step::kAllDone) scheduler.tell(ViewTraced(job->number()));
   });
@@ -53,6 +56,8 @@ TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> c
       options_(options),
       metrics_(metrics),
       period_(period_of(options.updates_per_second)),
+      looking_(options.looking * executor().workers()),
+      pace_(options.coding * executor().workers()),
       images_(options.image_bytes) {
   const bool fits = view_materials && view_materials->size() == layout_->instances.size();
   if (fits && peers_->view_renderer && scene::calls_for_view_layer(*view_materials)) view_materials_ = view_materials;
@@ -151,6 +156,7 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
 }
 
 void TileSchedulerActor::on(FrameDone&& message) {
+  pace_.done(message.busy);
   for (auto& [id, session] : sessions_) {
     if (session->view_layer && session->view_stream_id == message.stream) {
       session->view_layer->stream().frame_done(message.frame, message.ok, message.settled);
@@ -174,7 +180,7 @@ void TileSchedulerActor::on(ViewTraced&& message) {
 void TileSchedulerActor::on(Tick&&) {
   schedule_tick();
   bool work_changed = false;
-  for (auto& [id, session] : sessions_) {
+  for (Session* session : by_last_look()) {
     if (session->job && session->job->done()) finish_view(*session);  // its ViewTraced found a full mailbox
     session->pictures_since = session->pictures_since || pictures_came_;
     const bool expired = session->set.expire(now_us());
@@ -198,9 +204,19 @@ void TileSchedulerActor::on(Tick&&) {
   record_errors();
 }
 
-int TileSchedulerActor::passes_due(Session& session, bool moved) const {
+// Whoever was looked at longest ago comes first, so that none waits for more than a round of all.
+std::vector<TileSchedulerActor::Session*> TileSchedulerActor::by_last_look() {
+  std::vector<Session*> all;
+  all.reserve(sessions_.size());
+  for (const auto& [id, session] : sessions_) all.push_back(session.get());
+  std::ranges::stable_sort(all, {}, &Session::last_start);
+  return all;
+}
+
+int TileSchedulerActor::passes_due(Session& session, bool moved) {
   if (moved) return options_.passes_moving;
   const int done = session.set.passes();
+  if (done >= options_.passes_unlit && !looking_.allows(now_us())) return 0;
   const bool unlit = session.demand.lit < options_.lit && done >= options_.passes_unlit;
   if (unlit && ++session.updates_waited < options_.updates_unlit) return 0;
   session.updates_waited = 0;
@@ -232,6 +248,7 @@ void TileSchedulerActor::start_view(Session& session) {
   job->starts_pose = moved;
   session.posed = session.posed && !moved ? session.posed : session.view;
   session.job = job;
+  looking_.begin(job->rays(), session.last_start);
   post_slices(job);
 }
 
@@ -242,6 +259,7 @@ void TileSchedulerActor::post_slices(const std::shared_ptr<ViewJob>& job) {
 void TileSchedulerActor::finish_view(Session& session) {
   const auto job = std::exchange(session.job, nullptr);
   const auto traced = now_us();
+  looking_.end(job->rays(), job->busy());
   metrics_.observe("darm_view_trace_seconds", double(traced - job->answer.stamps.view_started) * 1e-6);
   if (job->starts_pose) session.set.start_pose(traced, passes_per_picture(session.posed->viewport));
   for (const auto& part : job->results()) session.set.add(part, 0);
@@ -283,6 +301,8 @@ void TileSchedulerActor::send_work() {
 
 void TileSchedulerActor::compose(Session& session) {
   const auto started = now_us();
+  const auto interval = pace_.interval(sessions_.size(), session.set.passes() <= options_.passes_unlit);
+  if (!session.stream.key_due() && started - session.stream.last_frame_at() < interval) return;  // a later tick will
   if (session.asked_at == 0) session.asked_at = started;
   const bool first = session.stream.last_frame() == 0;
   const bool nothing_yet = session.demand.granted.tiles.empty() && !session.demand.target.tiles.empty();

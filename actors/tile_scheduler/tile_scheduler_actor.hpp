@@ -14,21 +14,27 @@
 #include "actors/runtime/metrics.hpp"
 #include "actors/runtime/registry.hpp"
 #include "actors/session/session_messages.hpp"
+#include "actors/tile_scheduler/frame_pace.hpp"
 #include "actors/tile_scheduler/image_store.hpp"
 #include "actors/tile_scheduler/private_layer.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
+#include "actors/tile_scheduler/trace_budget.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
 
 namespace darm::tile_scheduler {
 
 struct SchedulerOptions {
-  double updates_per_second = 10;        ///< 0.1..1000: traces, allocations and frames per session
-  int passes_moving = 1;                 ///< visibility passes in the first update of a new pose, 1..64
-  int passes_still = 1;                  ///< and in each further one, until kAllPasses are done
-  float lit = 0.8f;                      ///< while pictures of less than this share of a view are there,
-  int passes_unlit = 2;                  ///< passes after these come
-  int updates_unlit = 4;                 ///< in one of so many updates: the same cores make the pictures
+  double updates_per_second = 10;  ///< 0.1..1000: traces, allocations and frames per session
+  int passes_moving = 1;           ///< visibility passes in the first update of a new pose, 1..64
+  int passes_still = 1;            ///< and in each further one, until kAllPasses are done
+  float lit = 0.8f;                ///< while pictures of less than this share of a view are there,
+  int passes_unlit = 2;            ///< passes after these come
+  int updates_unlit = 4;           ///< in one of so many updates: the same cores make the pictures
+  /// Share of the pool's time that tracing visibility may take before passes of still views wait; those under
+  /// `passes_unlit` never do.
+  double looking = 0.15;
+  double coding = 0.25;  ///< and that composing and encoding shared streams may take, views that move apart
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
   /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.
   Microseconds reweigh_interval = 1'000'000;
@@ -115,8 +121,9 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   [[nodiscard]] ImageLookup images() const;
   [[nodiscard]] Session* find(SessionId id);
   void schedule_tick();
+  [[nodiscard]] std::vector<Session*> by_last_look();
   void start_view(Session& session);
-  [[nodiscard]] int passes_due(Session& session, bool moved) const;
+  [[nodiscard]] int passes_due(Session& session, bool moved);
   void post_slices(const std::shared_ptr<ViewJob>& job);
   void finish_view(Session& session);
   void reallocate(Session& session);
@@ -139,6 +146,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   runtime::MetricSink& metrics_;
   std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials_;  // null: nothing private
   Microseconds period_;
+  TraceBudget looking_;
+  FramePace pace_;
   ImageStore images_;
   std::shared_ptr<const CoarseLuma> coarse_;  // null: none yet
   std::map<SessionId, std::unique_ptr<Session>> sessions_;

@@ -114,9 +114,10 @@ struct FrameDone {
   StreamId stream{};
   FrameNumber frame = 0;
   bool ok = true;
-  bool settled = true;  ///< false: the same picture coded again would be finer
-  FrameDone(StreamId s, FrameNumber f, bool success, bool is_settled = true)
-      : stream(s), frame(f), ok(success), settled(is_settled) {}
+  bool settled = true;    ///< false: the same picture coded again would be finer
+  Microseconds busy = 0;  ///< processor time of composing and encoding it; 0: unknown
+  FrameDone(StreamId s, FrameNumber f, bool success, bool is_settled = true, Microseconds took = 0)
+      : stream(s), frame(f), ok(success), settled(is_settled), busy(took) {}
 };
 
 /// Visibility of one session's view is traced (sent by the scheduler's own pool job to itself).

@@ -26,6 +26,11 @@ std::uint32_t ViewJob::first_row(unsigned slice) const {
   return static_cast<std::uint32_t>(std::uint64_t{block_rows(sampler_.viewport())} * slice / slice_count());
 }
 
+std::uint64_t ViewJob::rays() const {
+  return std::uint64_t{block_rows(sampler_.viewport())} * block_columns(sampler_.viewport()) *
+         static_cast<std::uint64_t>(pass_count_);
+}
+
 ViewJob::Step ViewJob::run_step(unsigned slice) {
   PrivateSamples own;
   if (materials_) own = {*materials_, &private_[slice]};

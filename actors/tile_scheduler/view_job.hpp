@@ -37,6 +37,11 @@ class ViewJob {
   [[nodiscard]] std::uint64_t number() const { return number_; }
   [[nodiscard]] unsigned slice_count() const { return static_cast<unsigned>(results_.size()); }
   [[nodiscard]] int pass_count() const { return pass_count_; }
+  /// Camera rays of the whole job.
+  [[nodiscard]] std::uint64_t rays() const;
+  /// What steps took is told to the job, because many threads take them. Thread-safe.
+  void note_busy(Microseconds took) { busy_.fetch_add(took, std::memory_order_relaxed); }
+  [[nodiscard]] Microseconds busy() const { return busy_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool done() const { return left_.load(std::memory_order_acquire) == 0; }
   [[nodiscard]] const std::vector<VisibleSet>& results() const { return results_; }
   /// What depends on the eye; empty if no materials were given.
@@ -65,6 +70,7 @@ class ViewJob {
   std::vector<Place> places_;  // of each slice
   std::atomic<unsigned> left_;
   std::atomic<bool> cancelled_ = false;
+  std::atomic<Microseconds> busy_ = 0;
 };
 
 }  // namespace darm::tile_scheduler

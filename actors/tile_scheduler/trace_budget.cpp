@@ -1,0 +1,42 @@
+#include "actors/tile_scheduler/trace_budget.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace darm::tile_scheduler {
+namespace {
+
+constexpr double kLearned = 0.2;  // weight of the newest trace
+constexpr double kLeastRayUs = 0.01, kMostRayUs = 100;
+
+}  // namespace
+
+TraceBudget::TraceBudget(double processors)
+    : processors_(std::isfinite(processors) ? std::max(processors, 1e-3) : 1.0) {}
+
+// Nothing is saved up: a pause does not allow a burst.
+void TraceBudget::pay(Microseconds now) {
+  const auto passed = std::max<Microseconds>(0, now - paid_at_);
+  paid_at_ = std::max(paid_at_, now);
+  debt_us_ = std::max(0.0, debt_us_ - processors_ * static_cast<double>(passed));
+}
+
+bool TraceBudget::allows(Microseconds now) {
+  pay(now);
+  return debt_us_ <= 0;
+}
+
+void TraceBudget::begin(std::uint64_t rays, Microseconds now) {
+  pay(now);
+  debt_us_ += static_cast<double>(rays) * ray_us_;
+}
+
+void TraceBudget::end(std::uint64_t rays, Microseconds busy) {
+  if (rays == 0) return;
+  const double took = static_cast<double>(std::max<Microseconds>(0, busy));
+  debt_us_ = std::max(0.0, debt_us_ + took - static_cast<double>(rays) * ray_us_);
+  const double each = std::clamp(took / static_cast<double>(rays), kLeastRayUs, kMostRayUs);
+  ray_us_ += kLearned * (each - ray_us_);
+}
+
+}  // namespace darm::tile_scheduler
