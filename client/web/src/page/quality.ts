@@ -19,6 +19,9 @@ export const kLadder: readonly Quality[] = [
   {samples: 1, multisample: 0, scale: 0.35},
 ];
 
+/** While nothing is known of the device yet: an eighth of the finest one's samples. */
+export const kUnknownDevice: Quality = kLadder[3]!;
+
 /** Milliseconds a picture may take while something moves; a level with this much to spare is left for a finer one. */
 const kBudgetMs = 33;
 const kSpareMs = 9;

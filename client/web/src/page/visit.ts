@@ -11,7 +11,7 @@ import {fromHash, toHash} from './link.js';
 import type {Notices} from './notices.js';
 import {Panel} from './panel.js';
 import {pick} from './pick.js';
-import {FrameGuard} from './quality.js';
+import {FrameGuard, kUnknownDevice} from './quality.js';
 import {Renderer} from './renderer.js';
 import type {Residency} from './residency.js';
 import {ResidencyCounter} from './residency.js';
@@ -292,7 +292,9 @@ export class Visit implements InputOwner {
     const renderer = this.renderer!;
     const {width, height} = this.fitCanvas();
     const finest = !moving && this.guard.mayRefine(performance.now());
-    const quality = finest ? this.guard.finest : this.guard.moving;
+    // How fast the device is shows with the first pictures: those until the scene is whole are cheap on any.
+    const whole = this.status.firstPictureMs !== null;
+    const quality = !whole ? kUnknownDevice : finest ? this.guard.finest : this.guard.moving;
     if (!this.dirty && (this.refined || quality !== this.guard.finest)) return;
     // A still view that cannot be refined yet keeps its finest picture rather than fall back to a coarser one.
     if (!moving && !finest && this.status.finest && this.guard.level > 0) return;
