@@ -80,7 +80,7 @@ class DesktopView(unittest.TestCase):
             daemon = Daemon(Path(folder) / "state", q=64)
             try:
                 outs = {kind: f"{folder}/{kind}" for kind in ("es", "desktop")}
-                views = {kind: display.view(daemon.tcp, 25, out, "--gl", kind) for kind, out in outs.items()}
+                views = {kind: display.view(daemon.tcp, 35, out, "--gl", kind) for kind, out in outs.items()}
                 for kind, out in outs.items():
                     report = done(views[kind], out)
                     dB = psnr(f"{out}.png", self.truth)
