@@ -96,7 +96,7 @@ class DesktopView(unittest.TestCase):
             state, out = Path(folder) / "state", f"{folder}/resumed"
             daemon = Daemon(state, q=64)
             port = daemon.tcp
-            view = display.view(port, 30, out)
+            view = display.view(port, 40, out)
             kill_once_watched(daemon)
             time.sleep(2)
             self.assertIsNone(view.poll(), "it outlives the server")
