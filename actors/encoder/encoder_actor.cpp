@@ -45,8 +45,9 @@ struct EncoderActor::Job {
   Microseconds started = 0;
   Microseconds composed = 0;
   Microseconds encoded = 0;
-  bool settled = true;  // the same picture again would not be finer
-  std::string error;    // empty: frame is good
+  Microseconds busy = 0;  // processor time of it all; the codec has one thread, ours
+  bool settled = true;    // the same picture again would not be finer
+  std::string error;      // empty: frame is good
 };
 
 EncoderActor::EncoderActor(runtime::Context<Inbox> context, EncoderOptions options, Receivers receivers,
@@ -89,6 +90,7 @@ void EncoderActor::begin(ComposeFrame&& command) {
 
 void EncoderActor::run(Pipeline& pipeline, Job& job, const runtime::Executor& executor) {
   job.started = micros(executor);
+  const auto busy_before = executor.thread_time();
   auto& frame = *job.frame;
   frame.frame = job.command.frame;
   frame.key = job.command.key;
@@ -127,6 +129,7 @@ void EncoderActor::run(Pipeline& pipeline, Job& job, const runtime::Executor& ex
   }
   if (!job.error.empty()) pipeline.encoder.reset();
   job.encoded = micros(executor);
+  job.busy = (executor.thread_time() - busy_before).count();
 }
 
 void EncoderActor::on(PictureEncoded&& event) {
@@ -135,8 +138,7 @@ void EncoderActor::on(PictureEncoded&& event) {
   key_required_ = !job->error.empty();
   record(*job);
   if (job->error.empty()) publish(*job);
-  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled,
-                                            job->encoded - job->started));
+  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled, job->busy));
   while (!job_ && !waiting_.empty()) {
     auto next = std::move(waiting_.front());
     waiting_.pop_front();

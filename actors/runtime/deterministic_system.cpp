@@ -37,6 +37,9 @@ class DeterministicSystem::Core final : public Host, public Executor {
     timers_.emplace(now_ + std::max(delay, std::chrono::microseconds(0)), std::move(work));
   }
   std::chrono::steady_clock::time_point now() const override { return now_; }
+  std::chrono::microseconds thread_time() const override {
+    return std::chrono::duration_cast<std::chrono::microseconds>(now_.time_since_epoch());
+  }
   unsigned workers() const override { return workers_; }
 
   bool step() {

@@ -21,6 +21,9 @@ class Executor {
   virtual void after(std::chrono::microseconds delay, std::function<void()> work) = 0;
   /// The steady clock (manual in tests).
   [[nodiscard]] virtual std::chrono::steady_clock::time_point now() const = 0;
+  /// Processor time of the calling thread so far: only differences taken on one thread mean anything. (In tests the
+  /// manual clock's.)
+  [[nodiscard]] virtual std::chrono::microseconds thread_time() const = 0;
   /// Pool threads, at least 1.
   [[nodiscard]] virtual unsigned workers() const = 0;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <ctime>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -50,6 +51,11 @@ class ThreadedSystem::Core final : public Host, public Executor {
     timer_.at(now() + std::max(delay, std::chrono::microseconds(0)), std::move(work));
   }
   std::chrono::steady_clock::time_point now() const override { return std::chrono::steady_clock::now(); }
+  std::chrono::microseconds thread_time() const override {
+    timespec spent{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &spent);  // cannot fail for the calling thread
+    return std::chrono::microseconds(std::int64_t{spent.tv_sec} * 1'000'000 + spent.tv_nsec / 1000);
+  }
   unsigned workers() const override { return pool_.threads(); }
 
   bool admit(const std::shared_ptr<CellBase>& cell) {

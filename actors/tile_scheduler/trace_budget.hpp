@@ -21,15 +21,13 @@ class TraceBudget {
   void begin(std::uint64_t rays, Microseconds now);
   /// That trace took so much processor time: the expectation is put right. `busy` 0 or more.
   void end(std::uint64_t rays, Microseconds busy);
-  /// What a ray is expected to take, microseconds.
-  [[nodiscard]] double ray_us() const { return ray_us_; }
 
  private:
   void pay(Microseconds now);
 
   double processors_;
-  double ray_us_ = 1.0;
-  double debt_us_ = 0;  // processor time spent beyond what has been earned
+  double ray_us_ = 1.0;  // what a ray is expected to take
+  double debt_us_ = 0;   // processor time spent beyond what has been earned
   Microseconds paid_at_ = 0;
 };
 

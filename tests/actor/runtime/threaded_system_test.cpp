@@ -104,6 +104,17 @@ TEST(ThreadedSystemTest, HigherPriorityIsTakenFirst) {
   EXPECT_EQ(finished.get_future().get(), "hnl");
 }
 
+TEST(ThreadedSystemTest, ThreadTimeGoesOnWithWorkAndNotWithWaiting) {
+  ThreadedSystem system({.workers = 1});
+  const auto& executor = system.executor();
+  const auto begin = executor.thread_time();
+  while (executor.thread_time() - begin < 5ms) {  // ends only because this work counts
+  }
+  const auto before = executor.thread_time();
+  std::this_thread::sleep_for(50ms);
+  EXPECT_LT(executor.thread_time() - before, 25ms);
+}
+
 TEST(ThreadedSystemTest, TimersFire) {
   ThreadedSystem system({.workers = 1});
   const auto start = system.executor().now();
