@@ -25,17 +25,32 @@ void StreamState::forget_session(SessionId session) {
   std::erase_if(answers_in_flight_, [&](const ViewAnswer& a) { return a.session == session; });
 }
 
-StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& images, float error, Microseconds now) {
+bool StreamState::polish_due(Microseconds now) const { return !settled_ && now - sent_at_ >= options_.polish_interval; }
+
+// Whether step() would make a frame that is no key frame.
+bool StreamState::has_news(std::span<const TileId> wanted, const ImageLookup& images, Microseconds now) const {
+  if (polish_due(now)) return true;
+  return std::ranges::any_of(wanted, [&](TileId tile) {
+    const auto slot = table_.slot_of(tile);
+    if (slot != kNoSlot && !refine_due(now)) return false;
+    const auto* image = images(tile);
+    return image != nullptr && image->image != nullptr && (slot == kNoSlot || image->version != sent_[slot].version);
+  });
+}
+
+StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& images, float error, Microseconds now,
+                             Microseconds least_interval) {
   StreamStep out;
   if (in_flight() && now - sent_at_ >= options_.lost_after) frame_done(in_flight_, false);
   if (in_flight()) return out;
-  encoder::ComposeFrame frame(last_frame_ + 1, key_pending_);
   wanted = wanted.first(std::min(wanted.size(), table_.capacity()));
+  if (!key_pending_ && now - sent_at_ < least_interval && has_news(wanted, images, now)) return out;
+  encoder::ComposeFrame frame(last_frame_ + 1, key_pending_);
   table_.begin_frame(frame.frame, wanted);
   enter_new(frame, wanted, images);
   if (key_pending_)
     write_all(frame, images);
-  else if (!frame.writes.empty() || now - sent_at_ >= options_.refine_interval)
+  else if (!frame.writes.empty() || refine_due(now))
     refine(frame, wanted, images);
   for (const auto& edit : key_pending_ ? table_.whole() : table_.take_edits()) frame.edits.push_back(edit_of(edit));
   if (key_pending_) static_cast<void>(table_.take_edits());
@@ -43,8 +58,7 @@ StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& 
   std::vector<ViewAnswer> answers;
   for (auto& [session, answer] : answers_) answers.push_back(answer);
   answers_.clear();
-  const bool polish = !settled_ && now - sent_at_ >= options_.polish_interval;
-  if (!frame.key && frame.writes.empty() && frame.edits.empty() && !polish) {
+  if (!frame.key && frame.writes.empty() && frame.edits.empty() && !polish_due(now)) {
     out.no_change = std::move(answers);
     return out;
   }

@@ -55,9 +55,11 @@ class StreamState {
   void forget_session(SessionId session);
 
   /// Decides on the next frame. `wanted`: tiles the sessions should have, most important first, at most as many as
-  /// slots; only those with an image enter. Nothing happens while a frame is in flight.
+  /// slots; only those with an image enter. Nothing happens while a frame is in flight. `least_interval` after the last
+  /// frame, what would make another one waits with its answers, but for a key frame; without anything to send cameras
+  /// are answered as ever.
   [[nodiscard]] StreamStep step(std::span<const TileId> wanted, const ImageLookup& images, float error,
-                                Microseconds now);
+                                Microseconds now, Microseconds least_interval = 0);
   /// The encoder is done with frame `number`. A failed frame makes the next one a key frame and is answered again. Not
   /// `settled`: coded again, the same picture would be finer, so a frame follows even if nothing changes.
   void frame_done(FrameNumber number, bool ok, bool settled = true);
@@ -66,11 +68,11 @@ class StreamState {
   [[nodiscard]] bool in_flight() const { return in_flight_ != 0; }
   [[nodiscard]] bool has_answers() const { return !answers_.empty(); }
   [[nodiscard]] FrameNumber last_frame() const { return last_frame_; }
-  [[nodiscard]] bool key_due() const { return key_pending_; }
-  /// When the last frame was given out; 0: none was.
-  [[nodiscard]] Microseconds last_frame_at() const { return sent_at_; }
 
  private:
+  [[nodiscard]] bool has_news(std::span<const TileId> wanted, const ImageLookup& images, Microseconds now) const;
+  [[nodiscard]] bool polish_due(Microseconds now) const;
+  [[nodiscard]] bool refine_due(Microseconds now) const { return now - sent_at_ >= options_.refine_interval; }
   void write_slot(encoder::ComposeFrame& frame, SlotIndex slot, const StoredImage& image);
   void enter_new(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images);
   void refine(encoder::ComposeFrame& frame, std::span<const TileId> wanted, const ImageLookup& images);

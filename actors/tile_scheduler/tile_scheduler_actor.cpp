@@ -24,10 +24,9 @@ bool same_view(const ViewChanged& a, const ViewChanged& b) {
 void post_step(runtime::Executor& executor, std::shared_ptr<ViewJob> job, unsigned slice,
                runtime::Ref<tile_scheduler::Inbox> scheduler) {
   executor.post(runtime::Priority::kHigh, [&executor, job = std::move(job), slice, scheduler = std::move(scheduler)] {
-    const auto begin = executor.now();
+    const auto before = executor.thread_time();
     const auto step = job->run_step(slice);
-    const auto took = std::chrono::duration_cast<std::chrono::microseconds>(executor.now() - begin);
-    job->note_busy(took.count());
+    job->note_busy((executor.thread_time() - before).count());
     if (step == ViewJob::Step::kMore) post_step(executor, job, slice, scheduler);
     if (step == ViewJob::Step::kAllDone) scheduler.tell(ViewTraced(job->number()));
   });
@@ -156,13 +155,13 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
 }
 
 void TileSchedulerActor::on(FrameDone&& message) {
-  pace_.done(message.busy);
   for (auto& [id, session] : sessions_) {
     if (session->view_layer && session->view_stream_id == message.stream) {
       session->view_layer->stream().frame_done(message.frame, message.ok, message.settled);
       return;
     }
     if (session->stream_id != message.stream) continue;
+    pace_.done(message.busy);
     session->stream.frame_done(message.frame, message.ok, message.settled);
     if (session->stream.has_answers()) compose(*session);
     return;
@@ -301,15 +300,15 @@ void TileSchedulerActor::send_work() {
 
 void TileSchedulerActor::compose(Session& session) {
   const auto started = now_us();
-  const auto interval = pace_.interval(sessions_.size(), session.set.passes() <= options_.passes_unlit);
-  if (!session.stream.key_due() && started - session.stream.last_frame_at() < interval) return;  // a later tick will
   if (session.asked_at == 0) session.asked_at = started;
   const bool first = session.stream.last_frame() == 0;
   const bool nothing_yet = session.demand.granted.tiles.empty() && !session.demand.target.tiles.empty();
   if (first && nothing_yet && started - session.asked_at < options_.first_frame_wait) return;
   const float error = view_error(session.demand, images(), layout_->coarse_level(), coarse_ != nullptr);
   session.error = error;
-  auto step = session.stream.step(session.demand.granted.tiles, images(), error, started);
+  const bool moving = session.set.passes() < options_.passes_unlit;
+  auto step = session.stream.step(session.demand.granted.tiles, images(), error, started,
+                                  pace_.interval(sessions_.size(), moving));
   for (const auto& answer : step.no_change)
     peers_->sessions->find(answer.session).tell(session::NoChange(answer, error));
   if (step.frame) send_frame(session, std::move(*step.frame));

@@ -241,6 +241,48 @@ TEST(StreamState, RefinementsWaitForTheIntervalButNewTilesDoNot) {
   EXPECT_TRUE(stream.step(wanted, images.lookup(), 0, 1'500'000).frame.has_value());
 }
 
+TEST(StreamState, APacedStreamHoldsItsNewsAndTheirAnswersButNotAKeyFrame) {
+  Images images;
+  std::vector<TileId> wanted;
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    wanted.push_back(TileId{0, i});
+    images.put(wanted.back(), 1);
+  }
+  StreamState stream(small(), {});
+  const auto first = stream.step({wanted.data(), 1}, images.lookup(), 0, 1'000'000, 500'000);
+  ASSERT_TRUE(first.frame && first.frame->key);
+  stream.frame_done(first.frame->frame, true);
+
+  stream.view_ready(answer(1));
+  const auto held = stream.step(wanted, images.lookup(), 0, 1'200'000, 500'000);
+  EXPECT_FALSE(held.frame);
+  EXPECT_TRUE(held.no_change.empty()) << "there is something to show for it";
+  const auto due = stream.step(wanted, images.lookup(), 0, 1'500'000, 500'000);
+  ASSERT_TRUE(due.frame);
+  ASSERT_EQ(due.frame->answers.size(), 1u);
+  EXPECT_EQ(due.frame->writes.size(), 1u);
+  stream.frame_done(due.frame->frame, true);
+
+  images.put(wanted[0], 2);
+  EXPECT_FALSE(stream.step(wanted, images.lookup(), 0, 1'600'000, 500'000).frame) << "nor is a refined tile sent";
+  stream.want_key();
+  EXPECT_TRUE(stream.step(wanted, images.lookup(), 0, 1'600'001, 500'000).frame);
+}
+
+TEST(StreamState, APacedStreamWithNothingToSendAnswersAtOnce) {
+  Images images;
+  const std::vector<TileId> wanted{TileId{0, 0}, TileId{0, 1}};  // the second has no picture yet
+  images.put(wanted[0], 1);
+  StreamState stream(small(), {});
+  const auto first = stream.step(wanted, images.lookup(), 0, 1'000'000, 500'000);
+  ASSERT_TRUE(first.frame);
+  stream.frame_done(first.frame->frame, true);
+  stream.view_ready(answer(1));
+  const auto next = stream.step(wanted, images.lookup(), 0, 1'000'001, 500'000);
+  EXPECT_FALSE(next.frame);
+  EXPECT_EQ(next.no_change.size(), 1u);
+}
+
 TEST(SlotCount, IsBoundedByTheNamesOfSlots) {
   StreamFormat f;
   EXPECT_EQ(slot_count(f), 4096u);
