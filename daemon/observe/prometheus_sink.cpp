@@ -22,6 +22,8 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/observe/metric_help.hpp"
+
 namespace darm::observe {
 namespace {
 
@@ -148,11 +150,8 @@ class PrometheusSink::Impl {
 
   std::shared_ptr<prometheus::Registry> registry_ptr_ = std::make_shared<prometheus::Registry>();
   prometheus::Registry& registry_ = *registry_ptr_;
-  prometheus::Counter& dropped_ = prometheus::BuildCounter()
-                                      .Name(kDropped)
-                                      .Help("Measurements of series over the limit")
-                                      .Register(registry_)
-                                      .Add({});
+  prometheus::Counter& dropped_ =
+      prometheus::BuildCounter().Name(kDropped).Help(std::string(metric_help(kDropped))).Register(registry_).Add({});
   std::shared_mutex mutex_;
   std::unordered_map<std::string, Metric, TextHash, std::equal_to<>> series_;
   std::atomic<bool> complained_ = false;
@@ -185,7 +184,7 @@ std::string PrometheusSink::text() const { return prometheus::TextSerializer().S
 void PrometheusSink::count(std::string_view name, double n, runtime::Labels labels) {
   auto* counter =
       impl_->series<prometheus::Counter>(name, labels, [](auto& registry, const std::string& full, const auto& map) {
-        return &prometheus::BuildCounter().Name(full).Register(registry).Add(map);
+        return &prometheus::BuildCounter().Name(full).Help(std::string(metric_help(full))).Register(registry).Add(map);
       });
   if (counter != nullptr && n > 0 && std::isfinite(n)) counter->Increment(n);
 }
@@ -193,7 +192,11 @@ void PrometheusSink::count(std::string_view name, double n, runtime::Labels labe
 void PrometheusSink::observe(std::string_view name, double value, runtime::Labels labels) {
   auto* histogram =
       impl_->series<prometheus::Histogram>(name, labels, [](auto& registry, const std::string& full, const auto& map) {
-        return &prometheus::BuildHistogram().Name(full).Register(registry).Add(map, buckets_for(full));
+        return &prometheus::BuildHistogram()
+                    .Name(full)
+                    .Help(std::string(metric_help(full)))
+                    .Register(registry)
+                    .Add(map, buckets_for(full));
       });
   if (histogram != nullptr && std::isfinite(value)) histogram->Observe(value);
 }
@@ -201,7 +204,7 @@ void PrometheusSink::observe(std::string_view name, double value, runtime::Label
 void PrometheusSink::set(std::string_view name, double value, runtime::Labels labels) {
   auto* gauge =
       impl_->series<prometheus::Gauge>(name, labels, [](auto& registry, const std::string& full, const auto& map) {
-        return &prometheus::BuildGauge().Name(full).Register(registry).Add(map);
+        return &prometheus::BuildGauge().Name(full).Help(std::string(metric_help(full))).Register(registry).Add(map);
       });
   if (gauge != nullptr) gauge->Set(value);
 }
