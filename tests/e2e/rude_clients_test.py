@@ -1,5 +1,6 @@
 """Clients that keep to the protocol's letter and ask for all they can: the others go on, and the daemon stops in time."""
 import math
+import re
 import signal
 import socket
 import struct
@@ -8,9 +9,10 @@ import time
 import unittest
 from pathlib import Path
 
-from running import Daemon, Folder, probe, wait_until
+from running import SOURCE, Daemon, Folder, probe, wait_until
 
-HELLO, CAMERA = 1, 2
+HELLO, CAMERA, WELCOME = 1, 2, 5
+VERSION = int(re.search(r"kProtocolVersion = (\d+)", (SOURCE / "proto/limits.hpp").read_text()).group(1))
 
 
 def varint(n):
@@ -37,12 +39,16 @@ def pose(angle, width, height):
 
 
 class Client:
-    """Reads and forgets what it is sent."""
+    """Reads and forgets what it is sent, once it has been let in."""
 
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port))
+        self.connected = True
+        self.send(HELLO, field(1, VERSION) + field(2, b"rude") + field(4, 2048))
+        answer = self.socket.recv(5, socket.MSG_WAITALL)
+        if len(answer) < 5 or answer[4] != WELCOME << 3 | 2:
+            raise AssertionError("no welcome but " + repr(answer))
         threading.Thread(target=self.drain, daemon=True).start()
-        self.send(HELLO, field(1, 1) + field(2, b"rude") + field(4, 2048))
 
     def drain(self):
         try:
@@ -50,6 +56,7 @@ class Client:
                 pass
         except OSError:
             pass
+        self.connected = False
 
     def send(self, kind, body):
         envelope = field(kind, body)
@@ -81,6 +88,7 @@ class RudeClients(unittest.TestCase):
             time.sleep(1)
             try:
                 report = probe(daemon.tcp, Path(folder) / "picture.png", "--seconds", "4")
+                still_there = [client.connected for client in rude]
             finally:
                 start = time.monotonic()
                 code = daemon.stop()
@@ -88,6 +96,7 @@ class RudeClients(unittest.TestCase):
                 done.set()
                 mover.join()
             self.assertEqual(code, 0)
+            self.assertEqual(still_there, [True, True])  # or nobody was rude
             self.assertLess(report["seconds_to_first_image"], 3)
             self.assertLess(stopped, 3)
 
