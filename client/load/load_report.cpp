@@ -34,7 +34,7 @@ void put_summary(const Summary& s, Json& j) {
 }
 
 Json of_role(const Summary& s) {
-  Json j{{"clients", s.clients}, {"connected", s.connected}};
+  Json j{{"clients", s.clients}, {"connected", s.connected}, {"without_frame", s.without_frame}};
   put_summary(s, j);
   j["integrity_faults"] = s.faults.total();
   return j;
@@ -77,6 +77,7 @@ std::string to_json(const LoadReport& r) {
   j["disconnects"] = Json::object();
   for (const auto& [reason, count] : r.disconnects) j["disconnects"][reason] = count;
   j["joins"] = r.joins;
+  j["without_frame"] = r.all.without_frame;
   j["seconds"] = r.seconds;
   j["seconds_to_ready"] = r.seconds_to_ready;
   j["all_ready"] = r.all_ready;

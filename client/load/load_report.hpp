@@ -27,8 +27,9 @@ struct Percentiles {
 /// Of the clients of one role, or of all. Rates are of the counted time: from its first frame on, for each client.
 struct Summary {
   std::uint32_t clients = 0;
-  std::uint32_t connected = 0;     ///< had their first frame and were not cut off
-  Percentiles updates_per_second;  ///< over clients: messages that were the first to answer a camera
+  std::uint32_t connected = 0;      ///< were welcomed and not cut off
+  std::uint32_t without_frame = 0;  ///< of these, never had a frame
+  Percentiles updates_per_second;   ///< over clients: messages that were the first to answer a camera
   double stream_frames_per_second = 0, no_changes_per_second = 0;  ///< of one client, mean
   Percentiles answer_ms;                                           ///< over all cameras
   std::uint64_t cameras = 0;

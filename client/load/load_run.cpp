@@ -23,6 +23,7 @@ using boost::system::error_code;
 
 constexpr std::chrono::milliseconds kTick{5};
 constexpr std::int64_t kSecond = 1'000'000;
+constexpr double kLastJoin = 2.0;  // seconds before the end, so that everybody has been welcomed by then
 
 double seconds(std::int64_t us) { return static_cast<double>(us) / 1e6; }
 
@@ -244,7 +245,8 @@ void Run::vanish_due(std::int64_t now) {
 
 // Healthy clients that do not decode leave in turn, and somebody else takes their place.
 void Run::churn_due(std::int64_t now) {
-  const auto due = static_cast<std::uint64_t>(seconds(now - counting_since_) * plan_.churn);
+  const double until = std::min(seconds(now - counting_since_), plan_.seconds - kLastJoin);
+  const auto due = static_cast<std::uint64_t>(std::max(until, 0.0) * plan_.churn);
   for (; churned_ < due; ++churned_) {
     for (std::size_t tries = 0; tries < slots_.size(); ++tries) {
       const std::uint32_t i = next_leaver_++ % static_cast<std::uint32_t>(slots_.size());

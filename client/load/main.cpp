@@ -49,7 +49,8 @@ bool complain(const LoadReport& report) {
   };
   if (report.all.connected < report.all.clients)
     say(std::to_string(report.all.clients - report.all.connected) + " of " + std::to_string(report.all.clients) +
-        " clients had no frame or were cut off");
+        " clients were not welcomed or were cut off");
+  if (!report.all_ready) say("not every client had its first frame before counting began");
   if (report.disconnects.contains("SERVER_FULL"))
     say("the server takes no more clients: raise [session] max_sessions in its configuration");
   if (report.all.faults.total() > 0) say(std::to_string(report.all.faults.total()) + " faults in what the server sent");

@@ -29,7 +29,9 @@ Summary summarise(const std::vector<ClientRecord>& records, std::optional<Role> 
     if (role && record.role != *role) continue;
     const auto& f = record.figures;
     ++s.clients;
-    s.connected += f.first_frame_us > 0 && !record.cut_off ? 1 : 0;
+    const bool connected = f.welcomed_us > 0 && !record.cut_off;
+    s.connected += connected ? 1 : 0;
+    s.without_frame += connected && f.first_frame_us == 0 ? 1 : 0;
     s.faults += f.faults;
     if (f.first_frame_us > 0) joins.push_back(static_cast<float>(f.first_frame_us - f.begun_us) / 1e6f);
     s.cameras += f.cameras;

@@ -16,6 +16,7 @@ ClientRecord client(Role role, std::uint64_t answers, std::vector<float> waits) 
   record.role = role;
   auto& f = record.figures;
   f.begun_us = 1'000'000;
+  f.welcomed_us = 1'100'000;
   f.first_frame_us = 2'000'000;
   f.from_us = 3'000'000;
   f.to_us = 13'000'000;  // ten seconds
@@ -69,8 +70,11 @@ TEST(Summary, WhoJoinedLateIsCountedFromItsFirstFrame) {
   EXPECT_DOUBLE_EQ(summarise({late}, std::nullopt).updates_per_second.p50, 10);
   late.figures.first_frame_us = 0;
   const auto never = summarise({late}, std::nullopt);
-  EXPECT_EQ(never.connected, 0u);
+  EXPECT_EQ(never.connected, 1u);
+  EXPECT_EQ(never.without_frame, 1u);
   EXPECT_DOUBLE_EQ(never.updates_per_second.p50, 0);
+  late.figures.welcomed_us = 0;
+  EXPECT_EQ(summarise({late}, std::nullopt).connected, 0u);
 }
 
 TEST(LoadReport, FiguresAreOfHealthyClientsAndCountsOfAll) {
