@@ -108,7 +108,7 @@ Result<void> Run::make_crowd() {
   crowd_ = std::move(*crowd);
   slots_.resize(crowd_.size());
   if (plan_.crowd.draw + plan_.crowd.decode == 0) return {};
-  auto worker = PictureWorker::create(plan_.crowd.draw > 0);
+  auto worker = PictureWorker::create(plan_.crowd.draw > 0, plan_.draw_height);
   if (!worker) return std::unexpected(worker.error());
   pictures_ = std::move(*worker);
   for (std::size_t i = 0; i < crowd_.size(); ++i)

@@ -20,7 +20,8 @@ struct LoadPlan {
   CrowdShape crowd;
   std::vector<CameraKey> walkthrough, places;  ///< either may be empty
   MachineSettings machine;
-  LinkShape link;  ///< of every client
+  LinkShape link;                   ///< of every client
+  std::uint32_t draw_height = 360;  ///< of pictures that are drawn
   double slow_bytes_per_second = 10'000;
   double seconds = 60;              ///< counted
   double warm_up = 60;              ///< counting begins after so long, though not all clients are ready

@@ -124,6 +124,9 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--height", plan.machine.height, "of each view, pixels")
       ->capture_default_str()
       ->check(CLI::Range(1u, 8192u));
+  app.add_option("--draw-height", plan.draw_height, "of pictures that are drawn, at most, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(1u, 8192u));
   app.add_option("--phystex", plan.machine.max_phystex, "largest PhysTex to accept, pixels")->capture_default_str();
   app.add_option("--view-phystex", plan.machine.max_view_phystex, "the same of the private layer; 0: none")
       ->capture_default_str();

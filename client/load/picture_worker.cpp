@@ -1,5 +1,6 @@
 #include "client/load/picture_worker.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -38,10 +39,18 @@ struct Counters {
   std::atomic<std::uint64_t> decoded{0}, skipped{0}, refused{0}, drawn{0};
 };
 
+View at_most_high(View view, std::uint32_t height) {
+  if (view.height <= height) return view;
+  view.width = std::max(1u, static_cast<std::uint32_t>(std::uint64_t{view.width} * height / view.height));
+  view.height = height;
+  return view;
+}
+
 // One client that decodes. Its thread is the worker's.
 class Pupil {
  public:
-  Pupil(bool draws, Counters& counters) : draws_(draws), counters_(counters) {}
+  Pupil(bool draws, std::uint32_t draw_height, Counters& counters)
+      : draws_(draws), draw_height_(draw_height), counters_(counters) {}
 
   void begin(const Shapes& shapes) { shapes_ = shapes; }
   void take(const wire::Envelope& envelope);
@@ -54,6 +63,7 @@ class Pupil {
   void refuse() { ++counters_.refused; }
 
   bool draws_;
+  std::uint32_t draw_height_;
   Counters& counters_;
   Shapes shapes_;
   std::optional<SceneModel> scene_;
@@ -125,7 +135,7 @@ void Pupil::draw_if_due(const std::optional<View>& view) {
   next_draw_ = std::max(next_draw_ + kDrawEvery, now);
   bool good = renderer_->synchronise(*scene_, *player_).has_value();
   if (own_player_) good = good && renderer_->synchronise_view(*scene_, *own_player_).has_value();
-  good = good && renderer_->draw(*scene_, *view).has_value();
+  good = good && renderer_->draw(*scene_, at_most_high(*view, draw_height_)).has_value();
   renderer_->finish();
   good ? ++counters_.drawn : ++counters_.refused;
 }
@@ -154,6 +164,7 @@ struct PictureWorker::State {
   std::deque<Job> jobs;
   std::size_t waiting_bytes = 0;
   bool stopping = false;
+  std::uint32_t draw_height = 0;
   std::vector<std::optional<View>> views;
   std::vector<std::unique_ptr<Sink>> sinks;
   std::vector<std::shared_ptr<Pupil>> pupils;
@@ -222,8 +233,9 @@ void PictureWorker::State::work() {
 
 PictureWorker::PictureWorker(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
-Result<std::unique_ptr<PictureWorker>> PictureWorker::create(bool draws) {
+Result<std::unique_ptr<PictureWorker>> PictureWorker::create(bool draws, std::uint32_t draw_height) {
   std::unique_ptr<PictureWorker> worker(new PictureWorker(std::make_unique<State>()));
+  worker->state_->draw_height = draw_height;
   std::promise<std::string> ready;
   auto error = ready.get_future();
   worker->state_->thread = std::thread([&state = *worker->state_, draws, &ready] { state.run(draws, ready); });
@@ -243,7 +255,7 @@ PictureWorker::~PictureWorker() {
 PictureSink* PictureWorker::add(bool draws) {
   State& s = *state_;
   const std::lock_guard lock(s.mutex);
-  s.pupils.push_back(std::make_shared<Pupil>(draws, s.counters));
+  s.pupils.push_back(std::make_shared<Pupil>(draws, s.draw_height, s.counters));
   s.views.emplace_back();
   s.sinks.push_back(std::make_unique<State::Sink>(s, s.sinks.size()));
   return s.sinks.back().get();

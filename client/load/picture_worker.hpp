@@ -2,6 +2,7 @@
 // them.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "client/core/result.hpp"
@@ -13,8 +14,9 @@ namespace darm::client::load {
 /// Waiting messages are bounded; what does not fit is skipped, and the decoder goes on at the next key frame.
 class PictureWorker {
  public:
-  /// `draws`: an OpenGL context without a window is needed. Error: there is none.
-  [[nodiscard]] static Result<std::unique_ptr<PictureWorker>> create(bool draws);
+  /// `draws`: an OpenGL context without a window is needed. Error: there is none. Pictures are at most `draw_height`
+  /// pixels high: software needs a second of processor for one of 1280x720.
+  [[nodiscard]] static Result<std::unique_ptr<PictureWorker>> create(bool draws, std::uint32_t draw_height);
   ~PictureWorker();
   PictureWorker(const PictureWorker&) = delete;
   PictureWorker& operator=(const PictureWorker&) = delete;
