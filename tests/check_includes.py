@@ -39,7 +39,7 @@ LIBRARIES = {
     r"tiny_?gltf": r"actors/scene/",
     r"embree3/": r"actors/renderer/trace/",
     r"libav(codec|util)/|libswscale/": r"actors/encoder/h264_|client/core/video_decoder|tests/",
-    r"toml\+\+|toml\.hpp": r"daemon/config/toml_value\.cpp|client/probe/camera_path\.cpp",
+    r"toml\+\+|toml\.hpp": r"daemon/config/toml_value\.cpp|client/core/camera_path\.cpp",
     r"prometheus/": r"daemon/observe/prometheus_sink\.cpp",
 }
 

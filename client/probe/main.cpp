@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <iostream>
 
+#include "client/core/camera_path.hpp"
 #include "client/core/egl_context.hpp"
 #include "client/core/number_option.hpp"
 #include "client/core/tls_options.hpp"
-#include "client/probe/camera_path.hpp"
 #include "client/probe/probe_session.hpp"
 #include "client/probe/report.hpp"
 
@@ -200,7 +200,8 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--server", a.server, "HOST:PORT of darmd's TCP port")->required();
   a.tls.declare(app);
   app.add_option("--camera", a.camera, "\"px,py,pz tx,ty,tz fovy_degrees\", or a name of --setup");
-  app.add_option("--setup", a.setup, "set-up file with [[cameras]], e.g. config/scenes/sponza.toml");
+  app.add_option("--setup", a.setup,
+                 "set-up file with [[cameras]] and [[load_cameras]], e.g. config/scenes/sponza.toml");
   app.add_option("--walkthrough", a.walkthrough,
                  "JSON list of {t, position, target, fovy}; begins at the first full image");
   app.add_option("--size", a.size, "picture, WIDTHxHEIGHT")->capture_default_str();

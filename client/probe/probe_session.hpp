@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "client/core/byte_stream.hpp"
+#include "client/core/camera_path.hpp"
 #include "client/core/connection.hpp"
 #include "client/core/image_metrics.hpp"
 #include "client/core/renderer_gles.hpp"
-#include "client/probe/camera_path.hpp"
 #include "client/probe/codec_check.hpp"
 #include "client/probe/lag_log.hpp"
 

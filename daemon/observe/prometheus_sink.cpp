@@ -3,10 +3,12 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
+#include <prometheus/collectable.h>
 #include <prometheus/counter.h>
 #include <prometheus/exposer.h>
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
+#include <prometheus/metric_family.h>
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 #include <spdlog/spdlog.h>
@@ -19,10 +21,12 @@
 #include <mutex>
 #include <shared_mutex>
 #include <unordered_map>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "daemon/observe/metric_help.hpp"
+#include "daemon/observe/process_stats.hpp"
 
 namespace darm::observe {
 namespace {
@@ -97,6 +101,30 @@ Result<std::unique_ptr<prometheus::Exposer>> make_exposer(const std::string& add
   }
 }
 
+prometheus::MetricFamily one_value(const char* name, const char* help, prometheus::MetricType type, double value) {
+  prometheus::ClientMetric metric;
+  if (type == prometheus::MetricType::Counter) {
+    metric.counter.value = value;
+  } else {
+    metric.gauge.value = value;
+  }
+  return {name, help, type, {metric}};
+}
+
+// The standard metrics of a process, read when they are asked for.
+class ProcessMetrics final : public prometheus::Collectable {
+ public:
+  [[nodiscard]] std::vector<prometheus::MetricFamily> Collect() const override {
+    using Type = prometheus::MetricType;
+    const auto stats = process_stats();
+    const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
+    return {one_value("process_cpu_seconds_total", "Processor time, user and system", Type::Counter, stats.cpu_seconds),
+            one_value("process_resident_memory_bytes", "Memory in use", Type::Gauge, number(stats.resident_bytes)),
+            one_value("process_open_fds", "File descriptors in use", Type::Gauge, number(stats.open_descriptors)),
+            one_value("process_max_fds", "File descriptors allowed", Type::Gauge, number(stats.most_descriptors))};
+  }
+};
+
 }  // namespace
 
 class PrometheusSink::Impl {
@@ -132,6 +160,7 @@ class PrometheusSink::Impl {
   prometheus::Registry& registry() { return *registry_ptr_; }
   const std::shared_ptr<prometheus::Registry>& shared_registry() const { return registry_ptr_; }
 
+  std::shared_ptr<ProcessMetrics> process = std::make_shared<ProcessMetrics>();
   std::unique_ptr<prometheus::Exposer> exposer;
   std::uint16_t port = 0;
   std::string url;
@@ -169,6 +198,7 @@ Result<void> PrometheusSink::expose(const std::string& address, std::uint16_t po
   }
   if (!exposer) return std::unexpected(exposer.error());
   (*exposer)->RegisterCollectable(impl_->shared_registry());
+  (*exposer)->RegisterCollectable(impl_->process);
   impl_->port = static_cast<std::uint16_t>((*exposer)->GetListeningPorts().front());
   impl_->url = fmt::format("http://{}/metrics", host_and_port(bound, impl_->port));
   impl_->exposer = std::move(*exposer);
@@ -179,7 +209,11 @@ std::string PrometheusSink::url() const { return impl_->url; }
 
 std::uint16_t PrometheusSink::port() const { return impl_->port; }
 
-std::string PrometheusSink::text() const { return prometheus::TextSerializer().Serialize(impl_->registry().Collect()); }
+std::string PrometheusSink::text() const {
+  auto families = impl_->registry().Collect();
+  for (auto& family : impl_->process->Collect()) families.push_back(std::move(family));
+  return prometheus::TextSerializer().Serialize(families);
+}
 
 void PrometheusSink::count(std::string_view name, double n, runtime::Labels labels) {
   auto* counter =

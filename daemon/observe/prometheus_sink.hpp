@@ -14,7 +14,7 @@ namespace darm::observe {
 /// Families come into being with their first measurement. Histograms of names in `_seconds` have buckets from 0.25 ms
 /// to 60 s, in `_bytes` from 256 B to 1 GiB, others from 0.001 to 10,000. At most 10,000 series: more are dropped and
 /// counted in `darm_metric_series_dropped_total`. Measuring one name by two methods is a bug; it is logged once and
-/// dropped.
+/// dropped. Beside them stand the standard metrics of a process: process_cpu_seconds_total and others.
 class PrometheusSink final : public runtime::MetricSink {
  public:
   /// Without an exposer: for tests and subcommands; text() shows what would be served.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/observe/log.hpp"
+#include "daemon/observe/process_stats.hpp"
 #include "daemon/observe/prometheus_sink.hpp"
 
 namespace darm::observe {
@@ -99,6 +100,37 @@ TEST(PrometheusSinkTest, ServesOverHttpOnAnyFreePort) {
   EXPECT_TRUE(has(answer, "200 OK")) << answer;
   EXPECT_TRUE(has(answer, "darm_ready 1")) << answer;
   EXPECT_TRUE(has(answer, "darm_build_info{version=\"1.2.3\"} 1")) << answer;
+}
+
+// The value of a series without labels; -1: there is none.
+double value_of(const std::string& text, const std::string& name) {
+  const auto at = text.find("\n" + name + " ");
+  return at == std::string::npos ? -1 : std::stod(text.substr(at + name.size() + 2));
+}
+
+TEST(PrometheusSinkTest, TheStandardMetricsOfAProcessAreShown) {
+  PrometheusSink sink;
+  ASSERT_TRUE(sink.expose("127.0.0.1", 0));
+  const std::string before = fetch(sink.port());
+  EXPECT_TRUE(has(before, "# TYPE process_cpu_seconds_total counter")) << before;
+  EXPECT_TRUE(has(before, "# TYPE process_resident_memory_bytes gauge")) << before;
+  EXPECT_GT(value_of(before, "process_resident_memory_bytes"), 1 << 20);
+  EXPECT_GT(value_of(before, "process_max_fds"), 2);
+  std::vector<int> files;
+  for (int i = 0; i < 20; ++i) files.push_back(dup(0));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(50);
+  while (std::chrono::steady_clock::now() < end) continue;
+  const std::string after = sink.text();
+  for (const int file : files) close(file);
+  EXPECT_GE(value_of(after, "process_open_fds"), value_of(sink.text(), "process_open_fds") + 18) << "but for a socket";
+  EXPECT_GT(value_of(after, "process_cpu_seconds_total"), value_of(before, "process_cpu_seconds_total"));
+}
+
+TEST(ProcessStats, PagesInMemoryAreTheSecondNumber) {
+  EXPECT_EQ(resident_pages("1000 250 30 4 0 99 0\n"), 250u);
+  EXPECT_FALSE(resident_pages("").has_value());
+  EXPECT_FALSE(resident_pages("1000").has_value());
+  EXPECT_FALSE(resident_pages("1000 x").has_value());
 }
 
 TEST(PrometheusSinkTest, AnyAndLoopbackOfIpv6AreServedOneWayOrTheOther) {

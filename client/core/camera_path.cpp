@@ -1,4 +1,4 @@
-#include "client/probe/camera_path.hpp"
+#include "client/core/camera_path.hpp"
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ namespace {
 #define TOML_ASSERT(condition) (static_cast<bool>(condition) ? static_cast<void>(0) : malformed_toml())
 #include <toml++/toml.h>
 
-namespace darm::client::probe {
+namespace darm::client {
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = 16u << 20;
@@ -88,6 +88,47 @@ std::optional<glm::dvec3> toml_vec(const toml::table& table, const char* name) {
   return glm::dvec3(v[0], v[1], v[2]);
 }
 
+struct NamedCamera {
+  std::string name;
+  CameraKey key;
+};
+
+Result<toml::table> read_toml(const std::filesystem::path& setup) {
+  try {  // toml++ reports faults of the file by exception
+    return toml::parse_file(setup.string());
+  } catch (const toml::parse_error& e) {
+    return fail(setup.string() + ": " + std::string(e.description()));
+  } catch (const std::runtime_error& e) {
+    return fail(setup.string() + ": " + e.what());
+  }
+}
+
+Result<NamedCamera> camera_of(const toml::table& entry, const std::string& where) {
+  NamedCamera camera;
+  camera.name = entry["name"].value_or(std::string());
+  const auto position = toml_vec(entry, "position"), target = toml_vec(entry, "target");
+  if (!position || !target) return fail(where + ": camera " + camera.name + " needs position and target");
+  camera.key = {0, *position, *target, entry["fovy"].value_or(60.0)};
+  if (!valid(camera.key)) return fail(where + ": camera " + camera.name + ": " + kBounds);
+  return camera;
+}
+
+Result<std::vector<CameraKey>> read_list(const std::filesystem::path& setup, const char* list) {
+  const auto table = read_toml(setup);
+  if (!table) return std::unexpected(table.error());
+  std::vector<CameraKey> keys;
+  if (const auto* entries = (*table)[list].as_array()) {
+    for (const auto& node : *entries) {
+      if (node.as_table() == nullptr) continue;
+      const auto camera = camera_of(*node.as_table(), setup.string());
+      if (!camera) return std::unexpected(camera.error());
+      keys.push_back(camera->key);
+    }
+  }
+  if (keys.empty()) return fail(setup.string() + ": has no [[" + list + "]]");
+  return keys;
+}
+
 }  // namespace
 
 Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::path& setup) {
@@ -97,31 +138,32 @@ Result<CameraKey> read_camera(const std::string& spec, const std::filesystem::pa
   }
   if (setup.empty())
     return fail("--camera " + spec + ": expected \"px,py,pz tx,ty,tz fovy\", or a name together with --setup FILE");
-  toml::table table;
-  try {  // toml++ reports faults of the file by exception
-    table = toml::parse_file(setup.string());
-  } catch (const toml::parse_error& e) {
-    return fail(setup.string() + ": " + std::string(e.description()));
-  } catch (const std::runtime_error& e) {
-    return fail(setup.string() + ": " + e.what());
-  }
+  const auto table = read_toml(setup);
+  if (!table) return std::unexpected(table.error());
   std::string known;
-  if (const auto* cameras = table["cameras"].as_array()) {
+  for (const char* list : {"cameras", "load_cameras"}) {
+    const auto* cameras = (*table)[list].as_array();
+    if (cameras == nullptr) continue;
     for (const auto& node : *cameras) {
-      const auto* camera = node.as_table();
-      if (camera == nullptr) continue;
-      const std::string name = (*camera)["name"].value_or(std::string());
+      const auto* entry = node.as_table();
+      if (entry == nullptr) continue;
+      const std::string name = (*entry)["name"].value_or(std::string());
       known += (known.empty() ? "" : ", ") + name;
       if (name != spec) continue;
-      const auto position = toml_vec(*camera, "position"), target = toml_vec(*camera, "target");
-      const CameraKey key{0, position.value_or(glm::dvec3(0)), target.value_or(glm::dvec3(0)),
-                          (*camera)["fovy"].value_or(60.0)};
-      if (!position || !target) return fail(setup.string() + ": camera " + name + " needs position and target");
-      if (!valid(key)) return fail(setup.string() + ": camera " + name + ": " + kBounds);
-      return key;
+      const auto camera = camera_of(*entry, setup.string());
+      if (!camera) return std::unexpected(camera.error());
+      return camera->key;
     }
   }
   return fail(setup.string() + ": no camera " + spec + " (there are: " + known + ")");
+}
+
+Result<std::vector<CameraKey>> read_load_groups(const std::filesystem::path& setup) {
+  return read_list(setup, "load_groups");
+}
+
+Result<std::vector<CameraKey>> read_load_cameras(const std::filesystem::path& setup) {
+  return read_list(setup, "load_cameras");
 }
 
 Result<std::vector<CameraKey>> read_walkthrough(const std::filesystem::path& file) {
@@ -182,4 +224,4 @@ View to_view(const CameraKey& key, std::uint32_t width, std::uint32_t height) {
   return look_at(key.position, key.target, key.fovy, width, height);
 }
 
-}  // namespace darm::client::probe
+}  // namespace darm::client

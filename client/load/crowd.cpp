@@ -1,0 +1,65 @@
+#include "client/load/crowd.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace darm::client::load {
+namespace {
+
+constexpr double kHeightShare = 0.2;  // of the spread: people differ less in height than in place
+
+// Even over the volume of the ellipsoid.
+glm::dvec3 shift_of(std::uint64_t seed, double spread) {
+  const double turn = 2 * std::numbers::pi * chance(seed, 1), up = 2 * chance(seed, 2) - 1;
+  const double radius = spread * std::cbrt(chance(seed, 3)), level = std::sqrt(1 - up * up);
+  return {radius * level * std::cos(turn), radius * up * kHeightShare, radius * level * std::sin(turn)};
+}
+
+Role role_of(const CrowdShape& shape, std::uint32_t index) {
+  const std::uint32_t from_last = shape.clients - 1 - index;
+  if (from_last < shape.slow) return Role::kSlow;
+  if (from_last < shape.slow + shape.vanish) return Role::kVanishing;
+  if (from_last < shape.slow + shape.vanish + shape.teleport) return Role::kTeleporting;
+  return Role::kHealthy;
+}
+
+}  // namespace
+
+std::string_view to_string(Role role) {
+  constexpr std::array<std::string_view, kRoles> kNames = {"healthy", "slow", "vanishing", "teleporting"};
+  return kNames[static_cast<std::size_t>(role)];
+}
+
+// SplitMix64 (Steele, Lea and Flood 2014), the upper 53 bits.
+double chance(std::uint64_t seed, std::uint64_t what) {
+  std::uint64_t x = seed * 0x9e3779b97f4a7c15u + what * 0xd1342543de82ef95u + 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53;
+}
+
+Result<std::vector<ClientPlan>> plan_crowd(const CrowdShape& shape) {
+  const std::uint64_t needed = std::uint64_t{shape.draw} + shape.decode + shape.slow + shape.vanish + shape.teleport;
+  if (needed > shape.clients) {
+    return fail(fmt::format("--clients {}: --draw, --decode, --slow, --vanish and --teleport together name {}",
+                            shape.clients, needed));
+  }
+  std::vector<ClientPlan> crowd(shape.clients);
+  for (std::uint32_t i = 0; i < shape.clients; ++i) {
+    auto& plan = crowd[i];
+    plan.index = i;
+    plan.group = i % shape.places;
+    plan.role = role_of(shape, i);
+    plan.draws = i < shape.draw;
+    plan.decodes = i < shape.draw + shape.decode;
+    plan.seed = shape.seed * 1'000'003 + i;
+    plan.shift = shift_of(plan.seed, shape.spread);
+    plan.late = chance(plan.seed, 4);
+  }
+  return crowd;
+}
+
+}  // namespace darm::client::load
