@@ -56,7 +56,8 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
     keep_answer(answer);
     return false;
   }
-  if (bulk_waiting_ > 0 || (mine.key_needed && !frame->key)) {
+  const bool follows = !mine.key_needed && frame->stream == mine.stream && frame->frame == mine.newest + 1;
+  if (bulk_waiting_ > 0 || (!frame->key && !follows)) {
     if (frame->key) mine.key_asked.reset();
     mine.key_needed = mine.refused = true;
     ++pictures_dropped_;
@@ -66,6 +67,7 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
   mine.key_needed = mine.refused = false;
   mine.key_asked.reset();
   mine.stream = frame->stream;
+  mine.newest = frame->frame;
   mine.waiting_bytes += size_of(*frame);
   ++mine.waiting;
   items_.push_back({Kind::kPicture, {}, frame, answer, 0, now});

@@ -87,7 +87,8 @@ class SendQueue {
     bool key_needed = true;
     bool refused = false;  // a picture was turned away: a key frame is of use
     std::optional<Microseconds> key_asked;
-    StreamId stream{};  // of the pictures that were taken
+    StreamId stream{};       // of the picture that was taken last,
+    FrameNumber newest = 0;  // and its number
   };
   static void await_key(Track& mine, Microseconds now);
   [[nodiscard]] Track& track(StreamLayer layer) { return tracks_[layer == StreamLayer::kView ? 1 : 0]; }

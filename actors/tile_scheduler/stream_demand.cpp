@@ -138,20 +138,4 @@ void share_available(std::span<ViewDemand* const> views, const JointView& joint,
   for (std::size_t v = 0; v < views.size(); ++v) views[v]->granted = part_of(granted, *views[v], joint.number[v]);
 }
 
-std::vector<TileId> wanted_by(std::span<const ViewDemand* const> views, std::size_t slots) {
-  std::vector<TileId> tiles;
-  if (views.size() == 1) {
-    tiles = views.front()->granted.tiles;
-  } else {
-    WeightedTiles all;
-    for (const auto* view : views)
-      for (std::size_t i = 0; i < view->granted.tiles.size(); ++i)
-        all.add(view->granted.tiles[i], view->granted.weights[i]);
-    std::vector<float> weights;
-    all.sorted(tiles, weights);
-  }
-  if (tiles.size() > slots) tiles.resize(slots);
-  return tiles;
-}
-
 }  // namespace darm::tile_scheduler

@@ -28,7 +28,4 @@ void share_slots(std::span<ViewDemand* const> views, const JointView& joint, con
 void share_available(std::span<ViewDemand* const> views, const JointView& joint, const PageTable& table,
                      const ImageLookup& images, int coarse_level, const AllocationOptions& options);
 
-/// Granted tiles of all views, those first that show most; at most `slots`.
-[[nodiscard]] std::vector<TileId> wanted_by(std::span<const ViewDemand* const> views, std::size_t slots);
-
 }  // namespace darm::tile_scheduler

@@ -8,6 +8,8 @@
 namespace darm::tile_scheduler {
 namespace {
 
+constexpr Microseconds kWorkPause = 4;  // times as long as it took
+
 Microseconds period_of(double updates_per_second) {
   const double rate = std::isfinite(updates_per_second) ? std::clamp(updates_per_second, 0.1, 1000.0) : 10.0;
   return static_cast<Microseconds>(1e6 / rate);
@@ -178,7 +180,7 @@ void TileSchedulerActor::on(Tick&&) {
     compose(*stream);
   }
   pictures_came_ = false;
-  if (work_changed_) send_work();
+  if (work_changed_) send_work_soon();
   record_errors();
 }
 
@@ -302,7 +304,7 @@ void TileSchedulerActor::know_view(Session& session, ViewAnswer answer) {
     reallocate(session);
   else
     place(session);
-  send_work();
+  send_work_soon();
   answer.stamps.view_ready = now_us();
   if (answer.sequence != 0) session.answer = answer;
   compose(*session.stream);
@@ -328,6 +330,7 @@ void TileSchedulerActor::reallocate(Session& session) {
 }
 
 void TileSchedulerActor::send_work() {
+  const auto started = now_us();
   work_changed_ = false;
   std::vector<const std::vector<renderer::TileRequest>*> views;
   for (const auto& [id, session] : sessions_) views.push_back(&session->demand.requests);
@@ -336,6 +339,13 @@ void TileSchedulerActor::send_work() {
   for (const auto& [id, session] : sessions_)
     message.coarse.insert(message.coarse.end(), session->demand.coarse.begin(), session->demand.coarse.end());
   peers_->renderer().tell(std::move(message));
+  work_after_ = now_us() + (now_us() - started) * kWorkPause;
+}
+
+// Joining what many views ask for takes its time: then a later view's is sent together with those after it.
+void TileSchedulerActor::send_work_soon() {
+  work_changed_ = true;
+  if (now_us() >= work_after_) send_work();
 }
 
 // One observation a view and update: quantiles over views, and the worst of now.

@@ -25,6 +25,7 @@
 #include "actors/tile_scheduler/trace_budget.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
+#include "actors/tile_scheduler/wanted_tiles.hpp"
 
 namespace darm::tile_scheduler {
 
@@ -100,12 +101,15 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     SessionId id{};
     StreamFormat format;
     float target_error = 0;
-    float error = 1;           // estimated, of the view as it was shown last
+    float error = 1;  // estimated, of the view as it was shown last
+    std::optional<Microseconds> error_at;
     Stream* stream = nullptr;  // from its first look on
     bool awaits_key = false;   // it came to the stream after that's last key frame
     WorkingSet set;
     std::vector<TileId> sharp;         // of the set, as the stream's tally has them
     ViewDemand demand;                 // as slots were chosen last
+    bool granted_new = true;           // demand.granted has changed since the stream's list was told
+    Allocation wanted;                 // what the list holds of it
     std::optional<ViewDemand> seen;    // newer; slots have not been chosen for it yet
     std::optional<ViewAnswer> answer;  // due with the stream's next frame
     std::optional<ViewChanged> view;   // newest camera
@@ -136,6 +140,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     StreamState state;
     std::vector<Session*> members;    // by id
     TileTally sharp;                  // of all members
+    WantedTiles wanted;               // of all members, while there are several
     JointView joint;                  // of members whose slots were chosen together
     Microseconds allocate_after = 0;  // the next time that is done, at the earliest
     bool ungranted = false;           // pictures have come since then
@@ -161,6 +166,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void know_view(Session& session, ViewAnswer answer);
   void reallocate(Session& session);
   void send_work();
+  void send_work_soon();
   void record_errors();
 
   // Streams.
@@ -177,6 +183,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void force_key(Stream& stream);
   void admit(Stream& stream, Microseconds now);
   void compose(Stream& stream);
+  [[nodiscard]] std::span<const TileId> wanted_of(Stream& stream);
   [[nodiscard]] std::vector<encoder::ViewError> errors_of(const Stream& stream);
   void send_frame(Stream& stream, encoder::ComposeFrame frame);
 
@@ -206,8 +213,9 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   std::uint64_t next_job_ = 1;
   std::uint64_t next_working_set_ = 1;
   std::uint32_t next_stream_ = 1;
-  bool pictures_came_ = false;  // since the last tick
-  bool work_changed_ = false;   // since it was sent
+  bool pictures_came_ = false;   // since the last tick
+  bool work_changed_ = false;    // since it was sent
+  Microseconds work_after_ = 0;  // it is not sent again before
 };
 
 }  // namespace darm::tile_scheduler

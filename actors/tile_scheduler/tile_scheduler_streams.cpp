@@ -7,6 +7,11 @@
 #include "actors/tile_scheduler/tile_scheduler_actor.hpp"
 
 namespace darm::tile_scheduler {
+namespace {
+
+constexpr Microseconds kErrorEvery = 30'000;
+
+}  // namespace
 
 // After its first look a session's stream is known. Before, it could be sent nothing anyway.
 void TileSchedulerActor::place(Session& session) {
@@ -42,6 +47,8 @@ void TileSchedulerActor::leave(Session& session) {
   if (auto open = stream.state.forget_session(session.id); open && !session.answer) session.answer = open;
   std::erase(stream.members, &session);
   stream.sharp.remove(session.sharp);
+  stream.wanted.remove(std::exchange(session.wanted, {}));
+  session.granted_new = true;
   stream.joint = {};  // its numbers were those of the members before
   peers_->set_receivers(stream.id, groups_.members(stream.id));
   if (!stream.members.empty()) return;
@@ -85,6 +92,7 @@ void TileSchedulerActor::note_weighed(Session& session) {
   session.weighed_at = now_us();
   session.pictures_since = false;
   for (const auto tile : session.demand.target.tiles) images_.touch(tile);
+  session.granted_new = true;
   work_changed_ = true;
   metrics_.observe("darm_view_tiles", double(session.demand.target.tiles.size()));
 }
@@ -140,11 +148,15 @@ void TileSchedulerActor::grant(Stream& stream) {
     std::vector<ViewDemand*> views;
     for (auto* member : stream.members) views.push_back(&member->demand);
     share_available(views, stream.joint, stream.state.table(), images(), level, options_.allocation);
+    for (auto* member : stream.members) member->granted_new = true;
     return note_chosen(stream, started);
   }
-  for (auto* member : stream.members)
-    if (!member->demand.joint)
-      grant_available(member->demand, level, stream.state.table(), images(), options_.allocation);
+  for (auto* member : stream.members) {
+    if (member->demand.joint) continue;
+    const auto before = member->demand.granted.tiles;
+    grant_available(member->demand, level, stream.state.table(), images(), options_.allocation);
+    member->granted_new = member->granted_new || before != member->demand.granted.tiles;
+  }
 }
 
 // Makes the next frame a key frame, unless there was one on demand just now: then a later tick does.
@@ -179,9 +191,7 @@ void TileSchedulerActor::compose(Stream& stream) {
   if (first && waits_for_pictures && started - stream.asked_at < options_.first_frame_wait) return;
   admit(stream, started);
   bool moving = false;
-  std::vector<const ViewDemand*> views;
   for (auto* member : stream.members) {
-    views.push_back(&member->demand);
     moving = moving || member->set.passes() < options_.passes_unlit;
     // What it does not have a key frame for, or no slots, it cannot be told of yet.
     if (!member->answer || member->awaits_key || member->seen) continue;
@@ -191,8 +201,7 @@ void TileSchedulerActor::compose(Stream& stream) {
   double squares = 0;
   for (const auto& e : errors) squares += double(e.error) * double(e.error);
   const auto error = static_cast<float>(std::sqrt(squares / double(std::max<std::size_t>(1, errors.size()))));
-  auto step = stream.state.step(wanted_by(views, stream.state.table().capacity()), images(), error, started,
-                                pace_.interval(streams_.size(), moving));
+  auto step = stream.state.step(wanted_of(stream), images(), error, started, pace_.interval(streams_.size(), moving));
   for (const auto& answer : step.no_change) {
     const auto* session = find(answer.session);
     peers_->sessions->find(answer.session).tell(session::NoChange(answer, session ? session->error : error));
@@ -204,10 +213,29 @@ void TileSchedulerActor::compose(Stream& stream) {
   metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
 }
 
+// Granted tiles of all members, those first that show most.
+std::span<const TileId> TileSchedulerActor::wanted_of(Stream& stream) {
+  if (stream.members.size() == 1) return stream.members.front()->demand.granted.tiles;
+  for (auto* member : stream.members) {
+    if (!std::exchange(member->granted_new, false)) continue;
+    stream.wanted.remove(member->wanted);
+    member->wanted.tiles = member->demand.granted.tiles;
+    member->wanted.weights = member->demand.granted.weights;
+    stream.wanted.add(member->wanted);
+  }
+  return stream.wanted.list(stream.state.table().capacity());
+}
+
+// An error takes a millisecond to know: where many share a stream, each of theirs is looked at less often.
 std::vector<encoder::ViewError> TileSchedulerActor::errors_of(const Stream& stream) {
   std::vector<encoder::ViewError> out;
+  const auto now = now_us();
+  const auto enough = kErrorEvery * static_cast<Microseconds>(stream.members.size() - 1);
   for (auto* member : stream.members) {
-    member->error = view_error(member->demand, images(), layout_->coarse_level(), coarse_ != nullptr);
+    if (!member->error_at || now - *member->error_at >= enough) {
+      member->error = view_error(member->demand, images(), layout_->coarse_level(), coarse_ != nullptr);
+      member->error_at = now;
+    }
     out.push_back({member->id, member->error});
   }
   return out;

@@ -167,29 +167,15 @@ TEST_F(EncoderActorTest, a_codec_that_cannot_open_is_reported_not_fatal) {
   EXPECT_TRUE(system.failures().empty());
 }
 
-// Its mailbox is full for so many turns.
-class BusyScheduler : public runtime::Actor<tile_scheduler::Inbox> {
- public:
-  BusyScheduler(runtime::Context<tile_scheduler::Inbox> context, std::vector<tile_scheduler::FrameDone>* done)
-      : Actor(std::move(context)), done_(done) {}
-  void on(tile_scheduler::FrameDone&& m) { done_->push_back(m); }
-  void on(tile_scheduler::ViewTraced&& m) {
-    if (m.job > 0) self().tell(tile_scheduler::ViewTraced(m.job - 1));
-  }
-  template <class M>
-  void on(M&&) {}
-
- private:
-  std::vector<tile_scheduler::FrameDone>* done_;
-};
-
 TEST_F(EncoderActorTest, a_scheduler_that_is_too_busy_hears_of_the_frame_later) {
   auto options = small();
   options.stream = StreamId{9};
-  const auto scheduler = system.spawn<BusyScheduler>("tile_scheduler", 1, &done);
-  auto nobody = [] { return std::vector<std::pair<SessionId, runtime::Ref<session::Inbox>>>(); };
+  const auto scheduler = system.spawn<SchedulerProbe>("tile_scheduler", 1, &done);
+  auto nobody = [&] {  // asked for just before the scheduler is told
+    EXPECT_TRUE(scheduler.tell(tile_scheduler::ViewTraced(1))) << "its mailbox is full now";
+    return std::vector<std::pair<SessionId, runtime::Ref<session::Inbox>>>();
+  };
   auto encoder = system.spawn<EncoderActor>("encoder/9", 16, options, nobody, scheduler, runtime::null_metrics());
-  scheduler.tell(tile_scheduler::ViewTraced(1000));
   encoder.tell(compose(1, true));
   system.run_until_idle();
   EXPECT_TRUE(done.empty());

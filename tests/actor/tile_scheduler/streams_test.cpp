@@ -83,6 +83,27 @@ TEST_F(SharedStreams, SessionsOfDifferentFormatDoNotShare) {
   EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
 }
 
+TEST_F(SharedStreams, APictureThatSomebodyLooksAtIsNotLookedForTwice) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  run(90);
+  const auto work = heard_.work.back().work->size();
+  open(bob_);
+  system_.clear_log();
+  look(bob_, 1, ahead_);
+  run(5);
+  for (const auto& handled : system_.messages_log()) EXPECT_NE(handled.message, "ViewTraced");
+  EXPECT_EQ(answered(bob_), std::set<CameraSequence>{1});
+  EXPECT_EQ(heard_.work.back().work->size(), work);
+  look(ann_, 2, aside_);
+  look(bob_, 2, aside_);
+  run(90);
+  int traces = 0;
+  for (const auto& handled : system_.messages_log()) traces += handled.message == "ViewTraced" ? 1 : 0;
+  EXPECT_LE(traces, kAllPasses) << "of one view";
+  EXPECT_TRUE(answered(ann_).contains(2) && answered(bob_).contains(2));
+}
+
 TEST_F(SharedStreams, WhatBothSeeHasOneSlot) {
   open(ann_);
   look(ann_, 1, ahead_);

@@ -112,6 +112,14 @@ TEST(SendQueue, of_another_stream_no_picture_is_sent_before_its_key_frame) {
   EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 2, 3, 0})) << "no answer is lost";
 }
 
+TEST(SendQueue, who_comes_back_to_a_stream_needs_its_key_frame_too) {
+  SendQueue q{SendLimits{}};
+  EXPECT_TRUE(q.push_picture(of_stream(1, 5, true), answer(0), 0));
+  EXPECT_FALSE(q.push_picture(of_stream(2, 9, false), answer(0), 1));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 8, false), answer(0), 2)) << "6 and 7 went to others";
+  EXPECT_TRUE(q.push_picture(of_stream(1, 9, true), answer(0), 3));
+}
+
 TEST(SendQueue, the_key_frame_of_another_stream_replaces_what_waits) {
   SendQueue q{SendLimits{}};
   Taker taker;

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "actors/tile_scheduler/wanted_tiles.hpp"
 #include "tests/unit/tile_scheduler/random.hpp"
 
 namespace darm::tile_scheduler {
@@ -42,7 +43,6 @@ class SharedSlots : public ::testing::Test {
     }
     joint_ = join_views(seen);
     share_slots(all, joint_, PageTable(slots), lookup(), kCoarse, {});
-    wanted_ = wanted_by(seen, slots);
   }
   ImageLookup lookup() {
     return [this](TileId tile) -> const StoredImage* {
@@ -58,7 +58,6 @@ class SharedSlots : public ::testing::Test {
     return sum;
   }
   JointView joint_;
-  std::vector<TileId> wanted_;
   std::map<TileId, StoredImage> images_;
 };
 
@@ -82,7 +81,7 @@ TEST_F(SharedSlots, AViewAmongOthersIsServedByTilesThatAreThere) {
         EXPECT_EQ(view.target.served[c], finest) << "also by what is there for others";
       }
     }
-    EXPECT_TRUE(wanted_.empty()) << "there are no pictures";
+    for (const auto& view : views) EXPECT_TRUE(view.granted.tiles.empty()) << "there are no pictures";
   }
 }
 
@@ -136,24 +135,50 @@ TEST_F(SharedSlots, MeasuredLossesAreMeansByWeightAndStandInForThoseNotMeasured)
   EXPECT_FLOAT_EQ(joint.losses[1][4], 7);
 }
 
-TEST_F(SharedSlots, GrantedAreTilesWithPicturesThoseFirstThatShowMost) {
+TEST_F(SharedSlots, GrantedAreTilesWithPictures) {
   std::vector<ViewDemand> views{view_at(0, 0, 16, 1), view_at(8, 0, 16, 2)};
   share(views, 150);
   for (std::size_t i = 0; i < views[0].target.tiles.size(); i += 2) shade(views[0].target.tiles[i]);
   std::vector<ViewDemand*> all{&views[0], &views[1]};
-  const std::vector<const ViewDemand*> seen{&views[0], &views[1]};
   share_available(all, joint_, PageTable(150), lookup(), kCoarse, {});
-  const auto wanted = wanted_by(seen, 150);
-  EXPECT_FALSE(wanted.empty());
-  std::map<TileId, float> weight;
+  for (const auto& view : views) {
+    EXPECT_FALSE(view.granted.tiles.empty());
+    for (const auto tile : view.granted.tiles) EXPECT_TRUE(images_.contains(tile));
+    EXPECT_LT(view.lit, 1);
+  }
   for (const auto& view : views)
-    for (std::size_t i = 0; i < view.granted.tiles.size(); ++i)
-      weight[view.granted.tiles[i]] += view.granted.weights[i];
-  for (const auto tile : wanted) EXPECT_TRUE(images_.contains(tile));
-  EXPECT_EQ(weight.size(), wanted.size());
-  for (std::size_t i = 1; i < wanted.size(); ++i) EXPECT_GE(weight[wanted[i - 1]], weight[wanted[i]]);
-  EXPECT_EQ(wanted_by(seen, 7).size(), 7u);
-  EXPECT_LT(views[0].lit, 1);
+    for (const auto tile : view.target.tiles) shade(tile);
+  share_available(all, joint_, PageTable(150), lookup(), kCoarse, {});
+  EXPECT_EQ(views[1].granted.tiles, views[1].target.tiles);
+}
+
+TEST(WantedTiles, AreThoseFirstThatShowMostOfAllViews) {
+  testing::Random random(8);
+  WantedTiles wanted;
+  std::vector<Allocation> views;
+  for (int step = 0; step < 300; ++step) {
+    if (views.size() < 8 || random() % 2 == 0) {
+      auto& view = views.emplace_back();
+      const auto first = random() % 20'000;
+      for (std::uint32_t i = 0; i < random() % 600; ++i) {
+        view.tiles.emplace_back(0, first + 3 * i);
+        view.weights.push_back(static_cast<float>(1 + random() % 1000) / 1024.0f);  // sums are exact
+      }
+      wanted.add(view);
+    } else {
+      const auto i = random() % views.size();
+      wanted.remove(views[i]);
+      views.erase(views.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    std::map<TileId, float> weight;
+    for (const auto& view : views)
+      for (std::size_t i = 0; i < view.tiles.size(); ++i) weight[view.tiles[i]] += view.weights[i];
+    std::vector<TileId> expected;
+    for (const auto& [tile, w] : weight) expected.push_back(tile);
+    std::ranges::stable_sort(expected, [&](TileId a, TileId b) { return weight[a] > weight[b]; });
+    if (expected.size() > 1000) expected.resize(1000);
+    ASSERT_EQ(wanted.list(1000), expected);
+  }
 }
 
 TEST(SignificantTiles, AreTheFewThatShowMostOfAView) {
