@@ -191,6 +191,7 @@ void EncoderActor::record(const Job& job) {
     metrics_.count("darm_view_bytes_total", static_cast<double>(job.frame->h264.size()));
     return;
   }
+  metrics_.count("darm_encoder_processor_seconds_total", static_cast<double>(job.busy) * 1e-6);
   metrics_.observe("darm_encoder_compose_seconds", seconds(job.started, job.composed));
   metrics_.observe("darm_encoder_encode_seconds", seconds(job.composed, job.encoded));
   metrics_.count("darm_encoder_frames_total");
