@@ -24,6 +24,7 @@ tile_scheduler::SchedulerOptions scheduler_options(const config::Config& config)
   options.updates_per_second = config.stream.updates_per_second;
   options.stream.max_writes = config.stream.max_writes;
   options.stream.refine_interval = kRefineInterval;
+  options.groups.share = config.stream.share;
   return options;
 }
 

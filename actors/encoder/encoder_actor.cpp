@@ -14,6 +14,15 @@ Microseconds micros(const runtime::Executor& executor) {
   return std::chrono::duration_cast<std::chrono::microseconds>(executor.now().time_since_epoch()).count();
 }
 
+constexpr std::chrono::milliseconds kTellAgainAfter{20};
+
+// FrameDone must arrive, or the stream stands still: a full mailbox is tried again until it takes it.
+void tell_done(runtime::Executor& executor, const runtime::Ref<tile_scheduler::Inbox>& scheduler,
+               const tile_scheduler::FrameDone& done) {
+  if (scheduler.tell(done) || !scheduler) return;
+  executor.after(kTellAgainAfter, [&executor, scheduler, done] { tell_done(executor, scheduler, done); });
+}
+
 double seconds(Microseconds from, Microseconds to) { return static_cast<double>(to - from) * 1e-6; }
 
 }  // namespace
@@ -77,7 +86,7 @@ void EncoderActor::begin(ComposeFrame&& command) {
         if (w.image) pipeline_->picture->write(w.slot, *w.image);
       }
     }
-    scheduler_.tell(tile_scheduler::FrameDone(options_.stream, command.frame, false));
+    tell_done(executor(), scheduler_, tile_scheduler::FrameDone(options_.stream, command.frame, false));
     return;
   }
   job_ = std::make_shared<Job>(std::move(command));
@@ -138,7 +147,8 @@ void EncoderActor::on(PictureEncoded&& event) {
   key_required_ = !job->error.empty();
   record(*job);
   if (job->error.empty()) publish(*job);
-  scheduler_.tell(tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled, job->busy));
+  tell_done(executor(), scheduler_,
+            tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled, job->busy));
   while (!job_ && !waiting_.empty()) {
     auto next = std::move(waiting_.front());
     waiting_.pop_front();
@@ -156,6 +166,9 @@ void EncoderActor::publish(Job& job) {
     const auto own = std::find_if(job.command.answers.begin(), job.command.answers.end(),
                                   [&, wanted = id](const ViewAnswer& a) { return a.session == wanted; });
     if (own != job.command.answers.end()) answer = *own;
+    const auto error = std::find_if(job.command.errors.begin(), job.command.errors.end(),
+                                    [wanted = id](const ViewError& e) { return e.session == wanted; });
+    answer.error = error == job.command.errors.end() ? job.command.error : error->error;
     answer.stamps.encode_started = job.started;
     answer.stamps.picture_composed = job.composed;
     answer.stamps.encoded = job.encoded;
@@ -178,6 +191,7 @@ void EncoderActor::record(const Job& job) {
     metrics_.count("darm_view_bytes_total", static_cast<double>(job.frame->h264.size()));
     return;
   }
+  metrics_.count("darm_encoder_processor_seconds_total", static_cast<double>(job.busy) * 1e-6);
   metrics_.observe("darm_encoder_compose_seconds", seconds(job.started, job.composed));
   metrics_.observe("darm_encoder_encode_seconds", seconds(job.composed, job.encoded));
   metrics_.count("darm_encoder_frames_total");

@@ -28,6 +28,12 @@ struct PageEdit {
   std::shared_ptr<const ThroughTile> through;    ///< likewise; null: nothing in the tile is clear
 };
 
+/// Estimated RMS display error of one session's view.
+struct ViewError {
+  SessionId session{};
+  float error = 0;
+};
+
 /// Make one frame. At most one per stream is under way: the scheduler waits for FrameDone.
 struct ComposeFrame {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
@@ -36,7 +42,8 @@ struct ComposeFrame {
   std::vector<SlotWrite> writes;
   std::vector<PageEdit> edits;  ///< replaces the whole table when `key`
   std::vector<ViewAnswer> answers;
-  float error = 0;  ///< estimated RMS display error of the view, 0..1
+  float error = 0;                ///< estimated RMS display error of all views of the stream, 0..1
+  std::vector<ViewError> errors;  ///< of each; a session that is not named has the stream's
   ComposeFrame(FrameNumber number, bool is_key) : frame(number), key(is_key) {}
 };
 

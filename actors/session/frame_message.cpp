@@ -18,7 +18,7 @@ SharedBytes serialize_body(const EncodedFrame& frame) {
   wire::StreamFrame m;
   m.set_frame(frame.frame);
   m.set_key(frame.key);
-  m.set_error(frame.error);
+  m.set_stream(static_cast<std::uint32_t>(frame.stream));
   m.set_h264(frame.h264.data(), frame.h264.size());
   for (const auto& e : frame.edits) {
     auto* edit = m.add_page_edits();
@@ -68,6 +68,7 @@ Packet frame_packet(FrameBodies& bodies, const std::shared_ptr<const EncodedFram
   packet.body = bodies.body_of(frame);
   wire::StreamFrame own;
   own.set_answers(answer.sequence);
+  own.set_error(answer.error);
   put_stamps(answer.stamps, *own.mutable_stamps());
   packet.tail.resize(own.ByteSizeLong());
   own.SerializeWithCachedSizesToArray(packet.tail.data());

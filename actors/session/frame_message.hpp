@@ -14,7 +14,7 @@
 
 namespace darm::session {
 
-/// The shared part of StreamFrame messages: picture, page table, error. Remembers the newest few, so that the sessions
+/// The shared part of StreamFrame messages: picture and page table. Remembers the newest few, so that the sessions
 /// of a stream serialize (and compress coverage) once between them. Thread-safe; one per daemon.
 class FrameBodies {
  public:

@@ -50,7 +50,15 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
   if (late || full) drop_pictures(layer);
   // A key frame makes what waits before it useless, and stands for it.
   if (frame->key && mine.waiting > 0) drop_pictures(layer);
-  if (bulk_waiting_ > 0 || (mine.key_needed && !frame->key)) {
+  if (!frame->key && frame->stream != mine.stream && !mine.refused) {
+    await_key(mine, now);
+    ++pictures_dropped_;
+    keep_answer(answer);
+    return false;
+  }
+  const bool follows = !mine.key_needed && frame->stream == mine.stream && frame->frame == mine.newest + 1;
+  if (bulk_waiting_ > 0 || (!frame->key && !follows)) {
+    if (frame->key) mine.key_asked.reset();
     mine.key_needed = mine.refused = true;
     ++pictures_dropped_;
     keep_answer(answer);
@@ -58,10 +66,19 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
   }
   mine.key_needed = mine.refused = false;
   mine.key_asked.reset();
+  mine.stream = frame->stream;
+  mine.newest = frame->frame;
   mine.waiting_bytes += size_of(*frame);
   ++mine.waiting;
   items_.push_back({Kind::kPicture, {}, frame, answer, 0, now});
   return true;
+}
+
+// Whoever comes to a stream is made a key frame without being asked, together with others who came. It is asked for
+// only where that does not come.
+void SendQueue::await_key(Track& mine, Microseconds now) {
+  if (!mine.key_asked) mine.key_asked = now;
+  if (now - *mine.key_asked >= kKeyPatience) mine.key_needed = mine.refused = true;
 }
 
 void SendQueue::push_no_change(const NoChange& event) {

@@ -28,8 +28,9 @@ struct SendLimits {
 /// what comes meanwhile waits for the write. Control messages, bulk and background are never dropped. Pictures are
 /// dropped whole, and all that wait together with the new one, because each builds on the one before; then only a key
 /// frame is taken. The two layers are streams of their own in this, with limits of their own. While bulk waits no
-/// picture is taken. The answer of a dropped picture travels with the next one that is sent. No clock inside: `now`
-/// must not decrease.
+/// picture is taken. Of a stream other than the pictures before no picture is taken until its key frame comes: the
+/// client keeps what it shows. The answer of a dropped picture travels with the next one that is sent. No clock inside:
+/// `now` must not decrease.
 class SendQueue {
  public:
   explicit SendQueue(const SendLimits& limits) : limits_(limits) {}
@@ -86,7 +87,10 @@ class SendQueue {
     bool key_needed = true;
     bool refused = false;  // a picture was turned away: a key frame is of use
     std::optional<Microseconds> key_asked;
+    StreamId stream{};       // of the picture that was taken last,
+    FrameNumber newest = 0;  // and its number
   };
+  static void await_key(Track& mine, Microseconds now);
   [[nodiscard]] Track& track(StreamLayer layer) { return tracks_[layer == StreamLayer::kView ? 1 : 0]; }
   void drop_pictures(StreamLayer layer);
   void keep_answer(const ViewAnswer& answer);

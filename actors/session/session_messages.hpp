@@ -27,7 +27,7 @@ struct EncodedFrame {
   std::vector<std::uint8_t> h264;            ///< Annex B, parameter sets in band on key frames; empty if lossless
   std::vector<encoder::SlotWrite> lossless;  ///< only for lossless_rgb streams
   std::vector<encoder::PageEdit> edits;      ///< the whole table when `key`
-  float error = 0;
+  float error = 0;                           ///< of all views of the stream; a session's own is in its answer
 };
 
 /// A frame for this session. `answer` names the camera it answers (sequence 0: none of this session's).

@@ -20,9 +20,15 @@ void StreamState::view_ready(const ViewAnswer& answer) {
   if (answer.sequence >= mine.sequence) mine = answer;
 }
 
-void StreamState::forget_session(SessionId session) {
+std::optional<ViewAnswer> StreamState::forget_session(SessionId session) {
+  std::optional<ViewAnswer> open;
+  const auto is_its = [&](const ViewAnswer& a) { return a.session == session; };
+  if (const auto sent = std::ranges::find_if(answers_in_flight_, is_its); sent != answers_in_flight_.end())
+    open = *sent;
+  if (const auto it = answers_.find(session); it != answers_.end()) open = it->second;
   answers_.erase(session);
-  std::erase_if(answers_in_flight_, [&](const ViewAnswer& a) { return a.session == session; });
+  std::erase_if(answers_in_flight_, is_its);
+  return open;
 }
 
 bool StreamState::polish_due(Microseconds now) const { return !settled_ && now - sent_at_ >= options_.polish_interval; }
@@ -41,7 +47,6 @@ bool StreamState::has_news(std::span<const TileId> wanted, const ImageLookup& im
 StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& images, float error, Microseconds now,
                              Microseconds least_interval) {
   StreamStep out;
-  if (in_flight() && now - sent_at_ >= options_.lost_after) frame_done(in_flight_, false);
   if (in_flight()) return out;
   wanted = wanted.first(std::min(wanted.size(), table_.capacity()));
   if (!key_pending_ && now - sent_at_ < least_interval && has_news(wanted, images, now)) return out;
@@ -74,7 +79,7 @@ StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& 
 }
 
 void StreamState::frame_done(FrameNumber number, bool ok, bool settled) {
-  if (number != in_flight_ || number == 0) return;  // a frame given up for lost, reported late
+  if (number != in_flight_ || number == 0) return;  // of an encoder that is gone
   in_flight_ = 0;
   settled_ = settled;
   auto answers = std::exchange(answers_in_flight_, {});

@@ -27,8 +27,7 @@ struct StoredImage {
 using ImageLookup = std::function<const StoredImage*(TileId)>;
 
 struct StreamOptions {
-  std::size_t max_writes = 2048;        ///< slots written per frame, key frames excepted; at least 1
-  Microseconds lost_after = 2'000'000;  ///< a frame not reported done after this counts as failed
+  std::size_t max_writes = 2048;  ///< slots written per frame, key frames excepted; at least 1
   /// Least time between frames that only refine what is shown: encoding one costs the same whether it holds one tile or
   /// a hundred, and that time is taken from shading. Frames with new tiles never wait.
   Microseconds refine_interval = 0;
@@ -52,7 +51,8 @@ class StreamState {
   void want_key() { key_pending_ = true; }
   /// The working set now includes this view; the next frame or NoChange answers it (once).
   void view_ready(const ViewAnswer& answer);
-  void forget_session(SessionId session);
+  /// The session goes. What it has not been answered for certain, if anything.
+  std::optional<ViewAnswer> forget_session(SessionId session);
 
   /// Decides on the next frame. `wanted`: tiles the sessions should have, most important first, at most as many as
   /// slots; only those with an image enter. Nothing happens while a frame is in flight. `least_interval` after the last
@@ -63,9 +63,13 @@ class StreamState {
   /// The encoder is done with frame `number`. A failed frame makes the next one a key frame and is answered again. Not
   /// `settled`: coded again, the same picture would be finer, so a frame follows even if nothing changes.
   void frame_done(FrameNumber number, bool ok, bool settled = true);
+  /// The encoder is gone, and the frame in flight with it. However long one takes is no sign of that.
+  void encoder_gone() { frame_done(in_flight_, false); }
 
   [[nodiscard]] const PageTable& table() const { return table_; }
   [[nodiscard]] bool in_flight() const { return in_flight_ != 0; }
+  /// The next frame is a key frame.
+  [[nodiscard]] bool key_pending() const { return key_pending_; }
   [[nodiscard]] bool has_answers() const { return !answers_.empty(); }
   [[nodiscard]] FrameNumber last_frame() const { return last_frame_; }
 

@@ -8,6 +8,8 @@
 namespace darm::tile_scheduler {
 namespace {
 
+constexpr Microseconds kWorkPause = 4;  // times as long as it took
+
 Microseconds period_of(double updates_per_second) {
   const double rate = std::isfinite(updates_per_second) ? std::clamp(updates_per_second, 0.1, 1000.0) : 10.0;
   return static_cast<Microseconds>(1e6 / rate);
@@ -57,7 +59,8 @@ TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> c
       period_(period_of(options.updates_per_second)),
       looking_(options.looking * executor().workers()),
       pace_(options.coding * executor().workers()),
-      images_(options.image_bytes) {
+      images_(options.image_bytes),
+      groups_(options.groups, [this] { return StreamId{next_stream_++}; }) {
   const bool fits = view_materials && view_materials->size() == layout_->instances.size();
   if (fits && peers_->view_renderer && scene::calls_for_view_layer(*view_materials)) view_materials_ = view_materials;
   options_.passes_moving = std::clamp(options_.passes_moving, 1, kAllPasses);
@@ -84,9 +87,6 @@ void TileSchedulerActor::on(SessionOpened&& message) {
   auto session = std::make_unique<Session>(message.format, options_);
   session->id = message.session;
   session->target_error = message.target_error;
-  session->stream_id = StreamId{next_stream_++};
-  session->encoder = peers_->make_encoder(session->stream_id, message.format);
-  peers_->set_receivers(session->stream_id, {message.session});
   if (view_materials_ && message.format.view_phystex > 0) open_view(*session);
   sessions_.emplace(message.session, std::move(session));
 }
@@ -94,12 +94,12 @@ void TileSchedulerActor::on(SessionOpened&& message) {
 void TileSchedulerActor::on(SessionClosed&& message) {
   const auto it = sessions_.find(message.session);
   if (it == sessions_.end()) return;
-  const auto stream = it->second->stream_id;
-  const auto encoder = it->second->encoder;
   close_view(*it->second);
+  groups_.remove(message.session);
+  const auto stream = it->second->stream ? it->second->stream->id : StreamId{};
+  leave(*it->second);
   sessions_.erase(it);
-  peers_->set_receivers(stream, {});
-  peers_->destroy_encoder(stream, encoder);
+  if (const auto left = streams_.find(stream); left != streams_.end()) settle(*left->second);
   send_work();  // what only this session saw is no longer shaded
 }
 
@@ -120,19 +120,12 @@ void TileSchedulerActor::on(KeyFrameWanted&& message) {
     if (session->view_key_put_off) metrics_.count("darm_view_key_frames_put_off_total");
     return;
   }
-  force_key(*session);
-  if (session->key_put_off)
+  if (session->stream == nullptr) return;  // it begins with one
+  force_key(*session->stream);
+  if (session->stream->key_put_off)
     metrics_.count("darm_key_frames_put_off_total", 1);
-  else if (session->set.passes() > 0)
-    compose(*session);
-}
-
-// Makes the session's next frame a key frame, unless it had one on demand just now: then a later tick does.
-void TileSchedulerActor::force_key(Session& session) {
-  session.key_put_off = session.key_forced_at && now_us() - *session.key_forced_at < options_.key_interval;
-  if (session.key_put_off) return;
-  session.key_forced_at = now_us();
-  session.stream.want_key();
+  else
+    compose(*session->stream);
 }
 
 void TileSchedulerActor::on(TilesShaded&& message) {
@@ -155,17 +148,17 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
 }
 
 void TileSchedulerActor::on(FrameDone&& message) {
-  for (auto& [id, session] : sessions_) {
-    if (session->view_layer && session->view_stream_id == message.stream) {
-      session->view_layer->stream().frame_done(message.frame, message.ok, message.settled);
-      return;
-    }
-    if (session->stream_id != message.stream) continue;
+  if (const auto it = streams_.find(message.stream); it != streams_.end()) {
+    auto& stream = *it->second;
     pace_.done(message.busy);
-    session->stream.frame_done(message.frame, message.ok, message.settled);
-    if (session->stream.has_answers()) compose(*session);
+    stream.state.frame_done(message.frame, message.ok, message.settled);
+    const auto waits = [](const Session* member) { return member->answer.has_value(); };
+    if (stream.state.has_answers() || std::ranges::any_of(stream.members, waits)) compose(stream);
     return;
   }
+  for (auto& [id, session] : sessions_)
+    if (session->view_layer && session->view_stream_id == message.stream)
+      session->view_layer->stream().frame_done(message.frame, message.ok, message.settled);
 }
 
 void TileSchedulerActor::on(ViewTraced&& message) {
@@ -178,29 +171,31 @@ void TileSchedulerActor::on(ViewTraced&& message) {
 
 void TileSchedulerActor::on(Tick&&) {
   schedule_tick();
-  bool work_changed = false;
-  for (Session* session : by_last_look()) {
-    if (session->job && session->job->done()) finish_view(*session);  // its ViewTraced found a full mailbox
-    session->pictures_since = session->pictures_since || pictures_came_;
-    const bool expired = session->set.expire(now_us());
-    const bool reweigh = session->demand.crowded && session->pictures_since &&
-                         now_us() - session->weighed_at >= options_.reweigh_interval;
-    if (expired || reweigh) {
-      reallocate(*session);
-      work_changed = true;
-    } else if (pictures_came_ && session->set.passes() > 0) {
-      grant_available(session->demand, layout_->coarse_level(), session->stream.table(), images(), options_.allocation);
-    }
-    if (session->key_put_off) force_key(*session);
-    if (session->view_layer && session->view_layer->expire(now_us())) reallocate_view(*session);
-    start_view(*session);
-    if (session->set.passes() > 0) compose(*session);
-    if (session->view_key_put_off) force_view_key(*session);
-    compose_view(*session);
+  for (Session* session : by_last_look()) update(*session);
+  regroup();
+  for (auto& [id, stream] : streams_) {
+    if (pictures_came_ || stream->ungranted) grant(*stream);
+    choose_together(*stream);
+    if (stream->key_put_off) force_key(*stream);
+    compose(*stream);
   }
   pictures_came_ = false;
-  if (work_changed) send_work();
+  if (work_changed_) send_work_soon();
   record_errors();
+}
+
+// A session's part of a tick.
+void TileSchedulerActor::update(Session& session) {
+  if (session.job && session.job->done()) finish_view(session);  // its ViewTraced found a full mailbox
+  session.pictures_since = session.pictures_since || pictures_came_;
+  const bool expired = session.set.expire(now_us());
+  const bool reweigh =
+      session.demand.crowded && session.pictures_since && now_us() - session.weighed_at >= options_.reweigh_interval;
+  if (session.stream && (expired || reweigh)) reallocate(session);
+  if (session.view_layer && session.view_layer->expire(now_us())) reallocate_view(session);
+  start_view(session);
+  if (session.view_key_put_off) force_view_key(session);
+  compose_view(session);
 }
 
 // Whoever was looked at longest ago comes first, so that none waits for more than a round of all.
@@ -222,9 +217,39 @@ int TileSchedulerActor::passes_due(Session& session, bool moved) {
   return std::min(options_.passes_still, kAllPasses - done);
 }
 
+// Whoever looks at the very same picture, and knows or is finding out more of it, looks for this session too. True if
+// there is nothing more to do now. (What depends on the eye comes of a look of its own.)
+bool TileSchedulerActor::look_with_another(Session& session) {
+  if (session.view_layer || session.job || !session.view) return false;
+  const bool moved = !session.posed || !same_view(*session.posed, *session.view);
+  const int done = moved ? 0 : session.set.passes();
+  if (done >= kAllPasses) return false;
+  const Session* best = nullptr;
+  int most = done;
+  bool looking = false;
+  for (const auto& [id, other] : sessions_) {
+    if (other.get() == &session || !other->posed || !same_view(*other->posed, *session.view)) continue;
+    looking = looking || other->job != nullptr;
+    const int passes = other->job && other->job->starts_pose ? 0 : other->set.passes();
+    if (passes <= most) continue;
+    best = other.get();
+    most = passes;
+  }
+  if (best == nullptr) return looking;
+  auto answer = answer_to(*session.view);
+  answer.stamps.view_started = now_us();
+  if (session.view->sequence <= session.taken_up) answer.sequence = 0;
+  session.taken_up = session.view->sequence;
+  session.last_start = answer.stamps.view_started;
+  if (moved) session.posed = session.view;
+  session.set.adopt(best->set, moved, answer.stamps.view_started);
+  know_view(session, answer);
+  return true;
+}
+
 // Begins the next trace of a session's newest view, if there is something to find out.
 void TileSchedulerActor::start_view(Session& session) {
-  if (session.job || !session.view) return;
+  if (session.job || !session.view || look_with_another(session)) return;
   const bool moved = !session.posed || !same_view(*session.posed, *session.view);
   const int done = moved ? 0 : session.set.passes();
   const int count = passes_due(session, moved);
@@ -235,8 +260,8 @@ void TileSchedulerActor::start_view(Session& session) {
   if (count <= 0) {
     if (!unanswered) return;
     answer.stamps.view_ready = now_us();
-    session.stream.view_ready(answer);
-    compose(session);
+    session.answer = answer;
+    if (session.stream) compose(*session.stream);
     return;
   }
   session.last_start = now_us();
@@ -268,27 +293,45 @@ void TileSchedulerActor::finish_view(Session& session) {
     for (const auto& part : job->private_results()) session.view_layer->add(part);
     reallocate_view(session);
   }
-  reallocate(session);
-  send_work();
-  auto answer = job->answer;
-  answer.stamps.view_ready = now_us();
-  if (answer.sequence != 0) session.stream.view_ready(answer);
-  compose(session);
+  know_view(session, job->answer);
+  for (auto& [id, other] : sessions_)
+    if (other->view && session.posed && same_view(*other->view, *session.posed)) look_with_another(*other);
 }
 
+// There is more in the session's set: work and frames follow from it.
+void TileSchedulerActor::know_view(Session& session, ViewAnswer answer) {
+  if (session.stream)
+    reallocate(session);
+  else
+    place(session);
+  send_work_soon();
+  answer.stamps.view_ready = now_us();
+  if (answer.sequence != 0) session.answer = answer;
+  compose(*session.stream);
+}
+
+// The session's set has changed, or what its pictures show: slots are chosen anew.
 void TileSchedulerActor::reallocate(Session& session) {
-  const auto started = now_us();
-  session.demand =
-      demand_of(session.set, *layout_, session.stream.table(), images(), coarse_.get(), options_.allocation);
-  for (auto& request : session.demand.requests) request.target_error = session.target_error;
-  session.weighed_at = now_us();
-  session.pictures_since = false;
-  for (const auto tile : session.demand.target.tiles) images_.touch(tile);
-  metrics_.observe("darm_allocation_seconds", double(now_us() - started) * 1e-6);
-  metrics_.observe("darm_view_tiles", double(session.demand.target.tiles.size()));
+  const auto chains = session.set.chains();
+  groups_.put(session.id, session.format.shared_format(), significant_tiles(chains, options_.significant));
+  auto& stream = *session.stream;
+  const bool was_crowded = stream.crowded();
+  stream.sharp.remove(session.sharp);
+  session.sharp = sharp_tiles(chains);
+  stream.sharp.add(session.sharp);
+  if (stream.crowded()) {
+    session.seen = seen_by(session.set, true, images(), coarse_.get(), layout_->coarse_level());
+    if (!was_crowded) return settle(stream);
+    choose_together(stream);
+  } else {
+    choose_alone(session);
+    if (was_crowded) settle(stream);
+  }
 }
 
 void TileSchedulerActor::send_work() {
+  const auto started = now_us();
+  work_changed_ = false;
   std::vector<const std::vector<renderer::TileRequest>*> views;
   for (const auto& [id, session] : sessions_) views.push_back(&session->demand.requests);
   auto work = std::make_shared<const std::vector<renderer::TileRequest>>(join_requests(views));
@@ -296,23 +339,13 @@ void TileSchedulerActor::send_work() {
   for (const auto& [id, session] : sessions_)
     message.coarse.insert(message.coarse.end(), session->demand.coarse.begin(), session->demand.coarse.end());
   peers_->renderer().tell(std::move(message));
+  work_after_ = now_us() + (now_us() - started) * kWorkPause;
 }
 
-void TileSchedulerActor::compose(Session& session) {
-  const auto started = now_us();
-  if (session.asked_at == 0) session.asked_at = started;
-  const bool first = session.stream.last_frame() == 0;
-  const bool nothing_yet = session.demand.granted.tiles.empty() && !session.demand.target.tiles.empty();
-  if (first && nothing_yet && started - session.asked_at < options_.first_frame_wait) return;
-  const float error = view_error(session.demand, images(), layout_->coarse_level(), coarse_ != nullptr);
-  session.error = error;
-  const bool moving = session.set.passes() < options_.passes_unlit;
-  auto step = session.stream.step(session.demand.granted.tiles, images(), error, started,
-                                  pace_.interval(sessions_.size(), moving));
-  for (const auto& answer : step.no_change)
-    peers_->sessions->find(answer.session).tell(session::NoChange(answer, error));
-  if (step.frame) send_frame(session, std::move(*step.frame));
-  metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
+// Joining what many views ask for takes its time: then a later view's is sent together with those after it.
+void TileSchedulerActor::send_work_soon() {
+  work_changed_ = true;
+  if (now_us() >= work_after_) send_work();
 }
 
 // One observation a view and update: quantiles over views, and the worst of now.
@@ -327,83 +360,6 @@ void TileSchedulerActor::record_errors() {
   }
   metrics_.set("darm_view_error_worst", worst);
   metrics_.set("darm_views_on_target", double(done));
-}
-
-void TileSchedulerActor::send_frame(Session& session, encoder::ComposeFrame frame) {
-  metrics_.observe("darm_frame_writes", double(frame.writes.size()));
-  metrics_.observe("darm_frame_edits", double(frame.edits.size()));
-  std::size_t used = 0;
-  for (const auto& [id, other] : sessions_) used += other->stream.table().size();
-  metrics_.set("darm_slots_used", double(used));
-  const auto number = frame.frame;
-  if (session.encoder.tell(std::move(frame))) return;
-  // The encoder is gone: a new one starts with a key frame, at the next tick.
-  session.encoder = peers_->make_encoder(session.stream_id, session.format);
-  session.stream.frame_done(number, false);
-}
-
-// ---- private layers -------------------------------------------------------------------------------------------------
-
-void TileSchedulerActor::open_view(Session& session) {
-  session.view_stream_id = StreamId{next_stream_++};
-  StreamOptions stream = options_.stream;
-  stream.refine_interval = options_.view_refine_interval;
-  session.view_layer.emplace(session.format.view_format(), stream, options_.view);
-  peers_->set_receivers(session.view_stream_id, {session.id});
-}
-
-void TileSchedulerActor::close_view(Session& session) {
-  if (!session.view_layer) return;
-  peers_->view_renderer().tell(renderer::ShadeView(session.id, glm::vec3(0.0f), 0.0f, nullptr));
-  peers_->set_receivers(session.view_stream_id, {});
-  if (session.view_encoder) peers_->destroy_encoder(session.view_stream_id, session.view_encoder);
-}
-
-// Chooses private tiles for what the eye sees, and has them shaded for where it is.
-void TileSchedulerActor::reallocate_view(Session& session) {
-  const auto started = now_us();
-  auto& layer = *session.view_layer;
-  const bool had = layer.target_size() > 0;
-  layer.reallocate(options_.allocation, layout_->coarse_level());
-  metrics_.observe("darm_view_allocation_seconds", double(now_us() - started) * 1e-6);
-  metrics_.observe("darm_view_private_tiles", double(layer.target_size()));
-  if (layer.target_size() > 0 || had) send_view_work(session);
-}
-
-// Until CoarseTex is there nobody has a picture at all, and the cores are the shared light's.
-void TileSchedulerActor::send_view_work(const Session& session) {
-  if (coarse_ == nullptr || !session.posed) return;
-  const glm::vec3 eye(session.posed->camera.position - rays_->scene().origin);
-  peers_->view_renderer().tell(
-      renderer::ShadeView(session.id, eye, session.target_error, session.view_layer->requests()));
-}
-
-// As force_key(), for the private layer.
-void TileSchedulerActor::force_view_key(Session& session) {
-  if (!session.view_layer) return;
-  const auto last = session.view_key_forced_at;
-  session.view_key_put_off = last && now_us() - *last < options_.key_interval;
-  if (session.view_key_put_off) return;
-  session.view_key_forced_at = now_us();
-  session.view_layer->stream().want_key();
-  compose_view(session);
-}
-
-void TileSchedulerActor::compose_view(Session& session) {
-  if (!session.view_layer || session.view_layer->idle()) return;
-  auto step = session.view_layer->step(now_us());
-  if (!step.frame) return;
-  if (!session.view_encoder)
-    session.view_encoder = peers_->make_encoder(session.view_stream_id, session.format.view_format());
-  std::size_t used = 0;
-  for (const auto& [id, other] : sessions_)
-    if (other->view_layer) used += other->view_layer->stream().table().size();
-  metrics_.set("darm_view_slots_used", double(used));
-  metrics_.observe("darm_view_frame_writes", double(step.frame->writes.size()));
-  const auto number = step.frame->frame;
-  if (session.view_encoder.tell(std::move(*step.frame))) return;
-  session.view_encoder = {};  // it is gone: a new one starts with a key frame, at the next tick
-  session.view_layer->stream().frame_done(number, false);
 }
 
 }  // namespace darm::tile_scheduler

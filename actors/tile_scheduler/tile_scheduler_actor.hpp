@@ -1,4 +1,6 @@
-// The tile scheduler: what each session sees -> what is shaded, what its stream holds, when a frame goes out.
+// The tile scheduler: what each session sees -> what is shaded, who shares a stream, what a stream holds, when its
+// frames go out. Handlers are in tile_scheduler_actor.cpp, streams in tile_scheduler_streams.cpp, private layers in
+// tile_scheduler_views.cpp.
 #pragma once
 
 #include <functional>
@@ -17,10 +19,13 @@
 #include "actors/tile_scheduler/frame_pace.hpp"
 #include "actors/tile_scheduler/image_store.hpp"
 #include "actors/tile_scheduler/private_layer.hpp"
+#include "actors/tile_scheduler/stream_demand.hpp"
+#include "actors/tile_scheduler/stream_groups.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
 #include "actors/tile_scheduler/trace_budget.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
+#include "actors/tile_scheduler/wanted_tiles.hpp"
 
 namespace darm::tile_scheduler {
 
@@ -40,8 +45,14 @@ struct SchedulerOptions {
   Microseconds reweigh_interval = 1'000'000;
   /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.
   Microseconds first_frame_wait = 300'000;
-  /// Least time between key frames that a session asks for: each writes every slot and the whole page table.
+  /// Least time between key frames that sessions of a stream ask for: each writes every slot and the whole page table.
   Microseconds key_interval = 500'000;
+  /// Least time between key frames for those who come to a stream: whoever comes meanwhile shares the next.
+  Microseconds join_interval = 300'000;
+  GroupOptions groups;
+  double significant =
+      0.98;               ///< streams are shared by what makes up so much of each view, coarser levels do for the rest
+  double weighing = 0.5;  ///< of one processor: what choosing tiles for several crowded views at once may take
   WorkingSetOptions working_set;
   AllocationOptions allocation;
   StreamOptions stream;
@@ -84,25 +95,29 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void on(Tick&& message);
 
  private:
+  struct Stream;
+  // One client: what it looks at, what it needs, what it has not been told yet.
   struct Session {
     SessionId id{};
-    StreamId stream_id{};
     StreamFormat format;
     float target_error = 0;
     float error = 1;  // estimated, of the view as it was shown last
-    runtime::Ref<encoder::Inbox> encoder;
-    StreamState stream;
+    std::optional<Microseconds> error_at;
+    Stream* stream = nullptr;  // from its first look on
+    bool awaits_key = false;   // it came to the stream after that's last key frame
     WorkingSet set;
-    ViewDemand demand;
+    std::vector<TileId> sharp;         // of the set, as the stream's tally has them
+    ViewDemand demand;                 // as slots were chosen last
+    bool granted_new = true;           // demand.granted has changed since the stream's list was told
+    Allocation wanted;                 // what the list holds of it
+    std::optional<ViewDemand> seen;    // newer; slots have not been chosen for it yet
+    std::optional<ViewAnswer> answer;  // due with the stream's next frame
     std::optional<ViewChanged> view;   // newest camera
     std::optional<ViewChanged> posed;  // the camera of the working set's pose
     CameraSequence taken_up = 0;       // newest sequence that a trace or an answer includes
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
     int updates_waited = 0;
-    Microseconds asked_at = 0;  // for the first pictures
-    std::optional<Microseconds> key_forced_at;
-    bool key_put_off = false;                // asked for again too soon after that
     Microseconds weighed_at = 0;             // of demand.target
     bool pictures_since = false;             // some came after that
     std::optional<PrivateLayer> view_layer;  // what depends on its eye
@@ -110,29 +125,71 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     runtime::Ref<encoder::Inbox> view_encoder;  // made with its first frame
     std::optional<Microseconds> view_key_forced_at;
     bool view_key_put_off = false;
-    Session(StreamFormat f, const SchedulerOptions& o) : format(f), stream(f, o.stream), set(o.working_set) {}
+    Session(StreamFormat f, const SchedulerOptions& o) : format(f), set(o.working_set) {}
     ~Session() {
       if (job) job->cancel();  // it goes with the session, and with the scheduler
     }
     Session(const Session&) = delete;
     Session& operator=(const Session&) = delete;
   };
+  // One PhysTex and its encoder, for all who look at much the same.
+  struct Stream {
+    StreamId id{};
+    StreamFormat format;
+    runtime::Ref<encoder::Inbox> encoder;
+    StreamState state;
+    std::vector<Session*> members;    // by id
+    TileTally sharp;                  // of all members
+    WantedTiles wanted;               // of all members, while there are several
+    JointView joint;                  // of members whose slots were chosen together
+    Microseconds allocate_after = 0;  // the next time that is done, at the earliest
+    bool ungranted = false;           // pictures have come since then
+    Microseconds asked_at = 0;        // for the first pictures
+    std::optional<Microseconds> key_at;
+    std::optional<Microseconds> key_forced_at;
+    bool key_put_off = false;  // asked for again too soon after that
+    Stream(StreamId number, const StreamFormat& f, const StreamOptions& o) : id(number), format(f), state(f, o) {}
+    // Several views that do not all fit: slots are chosen for all of them at once.
+    [[nodiscard]] bool crowded() const { return members.size() > 1 && sharp.distinct() > state.table().capacity(); }
+  };
 
   [[nodiscard]] ImageLookup images() const;
   [[nodiscard]] Session* find(SessionId id);
   void schedule_tick();
   [[nodiscard]] std::vector<Session*> by_last_look();
+  void update(Session& session);
+  bool look_with_another(Session& session);
   void start_view(Session& session);
   [[nodiscard]] int passes_due(Session& session, bool moved);
   void post_slices(const std::shared_ptr<ViewJob>& job);
   void finish_view(Session& session);
+  void know_view(Session& session, ViewAnswer answer);
   void reallocate(Session& session);
   void send_work();
-  void force_key(Session& session);
-  void compose(Session& session);
+  void send_work_soon();
   void record_errors();
-  void send_frame(Session& session, encoder::ComposeFrame frame);
+
+  // Streams.
+  void place(Session& session);
+  void enter(Session& session, StreamId id);
+  void leave(Session& session);
+  void regroup();
+  void settle(Stream& stream);
+  void choose_alone(Session& session);
+  void choose_together(Stream& stream);
+  void grant(Stream& stream);
+  void note_weighed(Session& session);
+  void note_chosen(Stream& stream, Microseconds started);
+  void force_key(Stream& stream);
+  void admit(Stream& stream, Microseconds now);
+  void compose(Stream& stream);
+  [[nodiscard]] std::span<const TileId> wanted_of(Stream& stream);
+  [[nodiscard]] std::vector<encoder::ViewError> errors_of(const Stream& stream);
+  void send_frame(Stream& stream, encoder::ComposeFrame frame);
+
+  // Private layers.
   void open_view(Session& session);
+  void name_view(Session& session);
   void close_view(Session& session);
   void reallocate_view(Session& session);
   void send_view_work(const Session& session);
@@ -151,10 +208,14 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   ImageStore images_;
   std::shared_ptr<const CoarseLuma> coarse_;  // null: none yet
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
+  std::map<StreamId, std::unique_ptr<Stream>> streams_;
+  StreamGroups groups_;
   std::uint64_t next_job_ = 1;
   std::uint64_t next_working_set_ = 1;
   std::uint32_t next_stream_ = 1;
-  bool pictures_came_ = false;  // since the last tick
+  bool pictures_came_ = false;   // since the last tick
+  bool work_changed_ = false;    // since it was sent
+  Microseconds work_after_ = 0;  // it is not sent again before
 };
 
 }  // namespace darm::tile_scheduler

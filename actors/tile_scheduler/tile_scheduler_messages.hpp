@@ -22,6 +22,14 @@ struct StreamFormat {
   std::uint32_t view_phystex = 0;  ///< of the private layer: 0 (none), 512 or 1024 (lossless: up to 2048)
   StreamLayer layer = StreamLayer::kShared;
 
+  bool operator==(const StreamFormat&) const = default;
+  /// The format of light for everybody: sessions of one such format may share a stream.
+  [[nodiscard]] StreamFormat shared_format() const {
+    StreamFormat f = *this;
+    f.view_phystex = 0;
+    f.layer = StreamLayer::kShared;
+    return f;
+  }
   /// The private layer's own stream. `view_phystex` > 0.
   [[nodiscard]] StreamFormat view_format() const {
     StreamFormat f = *this;

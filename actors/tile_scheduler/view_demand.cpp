@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "actors/tile_scheduler/visibility.hpp"
 
@@ -42,6 +43,8 @@ float weight_beside(const atlas::Layout& layout, const ViewDemand& demand, const
   return weight;
 }
 
+}  // namespace
+
 std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout& layout, const ViewDemand& demand) {
   const Target target(demand);
   TileIndex requested;
@@ -72,11 +75,49 @@ std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout&
   return out;
 }
 
-std::size_t sharp_tiles(const ViewDemand& demand) {
+std::vector<TileId> sharp_tiles(std::span<const WeightedChain> chains) {
   TileIndex tiles;
-  for (const auto& [chain, weight] : demand.chains) tiles.insert(chain.tiles[0]);
-  return tiles.size();
+  for (const auto& [chain, weight] : chains) tiles.insert(chain.tiles[0]);
+  return tiles.keys();
 }
+
+std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, double share) {
+  TileIndex tiles;
+  std::vector<double> weights;
+  double all = 0;
+  for (const auto& [chain, weight] : chains) {
+    const auto number = tiles.insert(chain.tiles[0]);
+    if (number == weights.size()) weights.push_back(0);
+    weights[number] += double(weight);
+    all += double(weight);
+  }
+  std::vector<std::uint32_t> order(weights.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
+    return weights[a] != weights[b] ? weights[a] > weights[b] : tiles.keys()[a] < tiles.keys()[b];
+  });
+  std::vector<TileId> out;
+  double sum = 0;
+  for (const auto number : order) {
+    if (sum >= share * all) break;
+    sum += weights[number];
+    out.push_back(tiles.keys()[number]);
+  }
+  return out;
+}
+
+ViewDemand seen_by(const WorkingSet& set, bool crowded, const ImageLookup& images, const CoarseLuma* coarse,
+                   int coarse_level) {
+  ViewDemand demand;
+  demand.chains = set.chains();
+  demand.crowded = crowded;
+  demand.rests = set.passes() >= kTapPasses;
+  // The chains of the present pose come first in chains(), by the numbers that its taps use.
+  if (crowded) demand.losses = measure_losses(demand.chains, set.current().taps(), images, coarse, coarse_level);
+  return demand;
+}
+
+namespace {
 
 AllocationRequest allocation_request(const ViewDemand& demand, std::span<const TileId> residents, std::size_t slots,
                                      int coarse_level) {
@@ -116,15 +157,13 @@ std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, 
 
 ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
                      const ImageLookup& images, const CoarseLuma* coarse, const AllocationOptions& options) {
-  ViewDemand demand;
-  demand.chains = set.chains();
-  const auto residents = table.residents();
-  demand.crowded = sharp_tiles(demand) > table.capacity();
-  // The chains of the present pose come first in chains(), by the numbers that its taps use.
+  auto demand = seen_by(set, false, images, coarse, layout.coarse_level());
+  demand.crowded = sharp_tiles(demand.chains).size() > table.capacity();
   if (demand.crowded)
     demand.losses = measure_losses(demand.chains, set.current().taps(), images, coarse, layout.coarse_level());
+  const auto residents = table.residents();
   auto request = allocation_request(demand, residents, table.capacity(), layout.coarse_level());
-  request.exchange = set.passes() >= kTapPasses;  // a view that rests
+  request.exchange = demand.rests;
   demand.target = allocate_slots(request, options);
   grant_available(demand, layout.coarse_level(), table, images, options);
   demand.requests = requests_of(set, layout, demand);
@@ -132,8 +171,7 @@ ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const P
   return demand;
 }
 
-void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
-                     const AllocationOptions& options) {
+bool note_lit(ViewDemand& demand, const ImageLookup& images) {
   const auto& tiles = demand.target.tiles;
   double all = 0, lit = 0;
   bool complete = true;
@@ -144,7 +182,12 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
     if (has) lit += double(demand.target.weights[i]);
   }
   demand.lit = all > 0 ? static_cast<float>(lit / all) : 0.0f;
-  if (complete) {
+  return complete;
+}
+
+void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,
+                     const AllocationOptions& options) {
+  if (note_lit(demand, images)) {
     demand.granted = demand.target;
     return;
   }

@@ -19,6 +19,8 @@ struct ViewDemand {
   std::vector<WeightedChain> chains;
   float lit = 0;                                ///< share of what the target serves whose tiles have pictures, 0..1
   bool crowded = false;                         ///< the sharp tiles do not all fit: what coarser ones lose decides
+  bool rests = false;                           ///< it has been looked at closely: slots are chosen with more care
+  bool joint = false;                           ///< its slots were chosen together with other views' (share_slots())
   std::vector<ChainLoss> losses;                ///< measured if crowded and there are pictures, else empty
   Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded
   Allocation granted;                           ///< the tiles it can have now: these get slots
@@ -31,11 +33,28 @@ struct ViewDemand {
 [[nodiscard]] std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen,
                                                                       const atlas::Layout& layout);
 
+/// Distinct tiles at the sharp level of some chain.
+[[nodiscard]] std::vector<TileId> sharp_tiles(std::span<const WeightedChain> chains);
+/// Those that matter: the heaviest which together have `share` (0..1) of the weight, heaviest first. Most tiles of a
+/// view show next to nothing of it.
+[[nodiscard]] std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, double share);
+
+/// What a view sees, without any decision; what coarser levels lose is measured if `crowded`.
+[[nodiscard]] ViewDemand seen_by(const WorkingSet& set, bool crowded, const ImageLookup& images,
+                                 const CoarseLuma* coarse, int coarse_level);
+
+/// What must be shaded for `demand.target`; `set` is what `demand` was made from.
+[[nodiscard]] std::vector<renderer::TileRequest> requests_of(const WorkingSet& set, const atlas::Layout& layout,
+                                                             const ViewDemand& demand);
+
 /// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. `coarse`:
 /// see measure_losses().
 [[nodiscard]] ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
                                    const ImageLookup& images, const CoarseLuma* coarse,
                                    const AllocationOptions& options);
+
+/// Sets `demand.lit`; true if every tile of the target has a picture.
+bool note_lit(ViewDemand& demand, const ImageLookup& images);
 
 /// Chooses `demand.granted` anew after pictures have come.
 void grant_available(ViewDemand& demand, int coarse_level, const PageTable& table, const ImageLookup& images,

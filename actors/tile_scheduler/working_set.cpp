@@ -26,6 +26,13 @@ void WorkingSet::add(const VisibleSet& samples, int passes) {
   if (before < passes_per_picture_ && passes_ >= passes_per_picture_) current_.forget_early();
 }
 
+void WorkingSet::adopt(const WorkingSet& other, bool moved, Microseconds now) {
+  if (moved) start_pose(now, other.passes_per_picture_);
+  current_ = other.current_;
+  passes_ = other.passes_;
+  passes_per_picture_ = other.passes_per_picture_;
+}
+
 bool WorkingSet::expire(Microseconds now) {
   if (previous_.tiles().empty() || now - moved_at_ < options_.keep_previous) return false;
   previous_.clear();

@@ -25,6 +25,8 @@ class WorkingSet {
   void start_pose(Microseconds now, int passes_per_picture);
   /// More samples of the present pose: `passes` whole passes are complete with them (0: part of a pass).
   void add(const VisibleSet& samples, int passes);
+  /// Takes over what another set knows of its present pose, which is this one's too: a new one here if `moved`.
+  void adopt(const WorkingSet& other, bool moved, Microseconds now);
   /// Drops the previous pose's set when its time is over. True if it did.
   bool expire(Microseconds now);
 

@@ -29,6 +29,7 @@ struct ViewAnswer {
   SessionId session{};
   CameraSequence sequence = 0;
   FrameStamps stamps;
+  float error = 0;  ///< estimated RMS display error of that session's view, 0..1
 };
 
 }  // namespace darm

@@ -95,7 +95,7 @@ void StreamPlayer::lose_track() {
 }
 
 Result<FrameFate> StreamPlayer::apply(const wire::StreamFrame& frame, const SceneModel& scene) {
-  if (!frame.key() && (key_wanted_ || frame.frame() != last_frame_ + 1)) {
+  if (!frame.key() && (key_wanted_ || frame.stream() != stream_ || frame.frame() != last_frame_ + 1)) {
     lose_track();
     return FrameFate::kSkipped;
   }
@@ -148,6 +148,7 @@ void StreamPlayer::commit(const wire::StreamFrame& frame, std::vector<Edit> edit
   }
   for (const auto& p : frame.pixels()) news_.pixels[static_cast<std::uint16_t>(p.slot())] = p.rgb();
   last_frame_ = frame.frame();
+  stream_ = frame.stream();
   key_wanted_ = false;
 }
 

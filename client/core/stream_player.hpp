@@ -37,7 +37,9 @@ enum class FrameFate : std::uint8_t {
 
 /// Keeps picture and page table of one stream in step: both of a frame, or neither (DESIGN section 4 "Frames").
 /// A gap in the frame numbers or a picture that does not decode skips frames until the next key frame; a message that
-/// contradicts the manifest (slot, tile or size out of range) is an error: the server is not to be trusted.
+/// contradicts the manifest (slot, tile or size out of range) is an error: the server is not to be trusted. The server
+/// may go over to another of its streams: with a key frame, which replaces what there was; until it is there the
+/// picture stays.
 class StreamPlayer {
  public:
   [[nodiscard]] static Result<StreamPlayer> create(const SceneModel& scene, const StreamShape& shape);
@@ -83,6 +85,7 @@ class StreamPlayer {
   std::shared_ptr<const Picture> picture_ = std::make_shared<Picture>();
   StreamNews news_;
   std::uint64_t last_frame_ = 0;
+  std::uint64_t stream_ = 0;  // of that frame
   std::uint64_t frames_lost_ = 0;
   bool key_wanted_ = true;
   bool begun_ = false;  // a frame was applied

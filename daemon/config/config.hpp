@@ -93,6 +93,7 @@ struct StreamConfig {
   std::uint32_t crf = 18;            ///< x264 constant rate factor: 0 best .. 51 worst; while light is rough
   std::uint32_t crf_finest = 8;      ///< the same, reached as the estimated error of light falls; 51 turns that off
   std::string preset = "superfast";  ///< x264 preset
+  bool share = true;                 ///< clients that see much the same share a stream
   bool chroma_444 = false;           ///< offer 4:4:4 to clients that can decode it
   bool allow_lossless = false;       ///< let clients ask for uncompressed tiles (evaluation only)
 };

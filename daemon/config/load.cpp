@@ -118,6 +118,7 @@ void read_work(TableReader& root, Config& config) {
     reader.integer("crf_finest", config.stream.crf_finest, 0, 51);
     reader.choice("preset", config.stream.preset,
                   {"ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"});
+    reader.boolean("share", config.stream.share);
     reader.boolean("chroma_444", config.stream.chroma_444);
     reader.boolean("allow_lossless", config.stream.allow_lossless);
   });

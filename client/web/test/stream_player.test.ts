@@ -71,6 +71,21 @@ test('a gap or damage skips both until the next key frame', async () => {
   assert.equal(p.resident, 0);
 });
 
+test('another stream is gone over to with a key frame only; until then everything stays', async () => {
+  const p = player();
+  const of = (stream: bigint, f: StreamFrame): StreamFrame => ({...f, stream});
+  await p.apply(of(4n, frame(7, true, [{tile: 0, slot: 1}])));
+  assert.equal(await p.apply(of(5n, frame(8, false, [{tile: 0, slot: 65535}]))), null, 'though its number would follow');
+  assert.ok(p.keyWanted);
+  assert.equal(p.resident, 1);
+  const update = await p.apply(of(5n, frame(3, true, [{tile: 2, slot: 3}, {tile: 3, slot: 0}])));
+  assert.ok(update?.picture);
+  assert.equal(update.fresh, false, 'of the same session');
+  assert.equal(p.resident, 2, 'the whole table is that of the new stream');
+  assert.ok(await p.apply(of(5n, frame(4, false))));
+  assert.equal(await p.apply(of(4n, frame(5, false))), null, 'a late one of the stream before');
+});
+
 test('what contradicts the manifest is refused', async () => {
   const small = new Uint8Array(deflateSync(new Uint8Array(1023)));
   const large = new Uint8Array(deflateSync(new Uint8Array(1_000_000)));

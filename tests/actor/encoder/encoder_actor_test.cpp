@@ -56,6 +56,7 @@ ComposeFrame compose(FrameNumber number, bool key, SlotIndex slot = 0) {
   answer.sequence = 40 + number;
   answer.stamps.client_sent = 7;
   c.answers.push_back(answer);
+  c.errors.push_back({SessionId{2}, 0.125f});
   return c;
 }
 
@@ -101,6 +102,8 @@ TEST_F(EncoderActorTest, one_picture_reaches_every_session_with_its_own_answer) 
   EXPECT_FLOAT_EQ(first.frame->error, 0.25f);
   EXPECT_EQ(first.answer.sequence, 0u);
   EXPECT_EQ(first.answer.session, SessionId{1});
+  EXPECT_FLOAT_EQ(first.answer.error, 0.25f) << "the stream's";
+  EXPECT_FLOAT_EQ(second.answer.error, 0.125f) << "its own";
   EXPECT_EQ(second.answer.sequence, 41u);
   EXPECT_EQ(second.answer.stamps.client_sent, 7);
   EXPECT_LE(second.answer.stamps.encode_started, second.answer.stamps.picture_composed);
@@ -162,6 +165,23 @@ TEST_F(EncoderActorTest, a_codec_that_cannot_open_is_reported_not_fatal) {
   ASSERT_EQ(done.size(), 1u);
   EXPECT_FALSE(done[0].ok);
   EXPECT_TRUE(system.failures().empty());
+}
+
+TEST_F(EncoderActorTest, a_scheduler_that_is_too_busy_hears_of_the_frame_later) {
+  auto options = small();
+  options.stream = StreamId{9};
+  const auto scheduler = system.spawn<SchedulerProbe>("tile_scheduler", 1, &done);
+  auto nobody = [&] {  // asked for just before the scheduler is told
+    EXPECT_TRUE(scheduler.tell(tile_scheduler::ViewTraced(1))) << "its mailbox is full now";
+    return std::vector<std::pair<SessionId, runtime::Ref<session::Inbox>>>();
+  };
+  auto encoder = system.spawn<EncoderActor>("encoder/9", 16, options, nobody, scheduler, runtime::null_metrics());
+  encoder.tell(compose(1, true));
+  system.run_until_idle();
+  EXPECT_TRUE(done.empty());
+  system.advance(std::chrono::milliseconds(100));
+  ASSERT_EQ(done.size(), 1u);
+  EXPECT_TRUE(done[0].ok);
 }
 
 std::shared_ptr<const CoarsePicture> coarse_noise(std::uint32_t version, std::uint32_t size) {

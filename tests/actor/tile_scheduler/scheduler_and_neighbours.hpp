@@ -81,7 +81,8 @@ class TileScheduler : public ::testing::Test {
     peers_->renderer = [this] { return renderer_; };
     peers_->make_encoder = [this](StreamId id, const StreamFormat&) {
       heard_.encoders.insert(id);
-      return system_.spawn<FakeEncoder>("encoder/" + std::to_string(static_cast<unsigned>(id)), 16, &heard_, id);
+      const auto name = "encoder/" + std::to_string(static_cast<unsigned>(id));
+      return encoders_[id] = system_.spawn<FakeEncoder>(name, 16, &heard_, id);
     };
     peers_->destroy_encoder = [this](StreamId id, const runtime::Ref<encoder::Inbox>& encoder) {
       heard_.encoders.erase(id);
@@ -147,6 +148,7 @@ class TileScheduler : public ::testing::Test {
   runtime::DeterministicSystem system_;
   runtime::Ref<renderer::Inbox> renderer_;
   runtime::Ref<renderer::ViewInbox> view_renderer_;
+  std::map<StreamId, runtime::Ref<encoder::Inbox>> encoders_;  // ever made
   runtime::Ref<tile_scheduler::Inbox> scheduler_;
 };
 

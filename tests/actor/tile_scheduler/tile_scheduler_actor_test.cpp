@@ -9,10 +9,10 @@ namespace {
 
 TEST_F(TileScheduler, AnswersACameraWithWorkForTheRendererAndAKeyFrame) {
   open(ann_);
-  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
   tick();
   EXPECT_TRUE(heard_.frames[first_].empty()) << "no camera, no frame";
   look(ann_, 1, ahead_);
+  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
   ASSERT_FALSE(heard_.work.empty());
   EXPECT_FALSE(heard_.work.back().work->empty());
   ASSERT_EQ(heard_.frames[first_].size(), 1u);
@@ -200,7 +200,7 @@ TEST_F(TileScheduler, JoinsTheWorkOfAllSessionsAndForgetsAClosedOne) {
   system_.run_until_idle();
   EXPECT_EQ(heard_.work.back().work->size(), anns);
   EXPECT_EQ(heard_.encoders, std::set<StreamId>{first_});
-  EXPECT_TRUE(heard_.receivers[StreamId{2}].empty());
+  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
 }
 
 TEST_F(TileScheduler, SharedTilesAreAsExactAsTheMostExactingSessionAsks) {
@@ -235,11 +235,12 @@ TEST_F(TileScheduler, ASessionThatClosesWhileItsViewIsTracedLeavesNothingBehind)
 TEST_F(TileScheduler, ASmallViewNeedNotWaitForTheLargestThereIs) {
   const SessionId bob{2};
   open(ann_);
-  open(bob);
+  open(bob, 2048);
   scheduler_.tell(ViewChanged(ann_, 1, ahead_, Viewport{16384, 16384}, FrameStamps{}));
   scheduler_.tell(ViewChanged(bob, 1, aside_, Viewport{160, 90}, FrameStamps{}));
   system_.run_until_idle();
-  EXPECT_EQ(heard_.order, (std::vector<StreamId>{StreamId{2}, first_})) << "slices take turns";
+  EXPECT_EQ(heard_.order, (std::vector<StreamId>{first_, StreamId{2}}));
+  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{bob}) << "slices take turns";
 }
 
 TEST_F(TileScheduler, WhatAClosedSessionWouldHaveSeenIsTracedNoFurther) {

@@ -101,6 +101,29 @@ TEST_F(Player, AppliesPictureAndPagesTogetherOrNeither) {
   EXPECT_EQ(player_->frame_shown(), 9u);
 }
 
+TEST_F(Player, GoesOverToAnotherStreamWithAKeyFrameOnlyAndKeepsThePictureUntilThen) {
+  open(false);
+  const auto of = [](std::uint64_t stream, wire::StreamFrame f) {
+    f.set_stream(stream);
+    return f;
+  };
+  EXPECT_EQ(apply(of(4, frame(7, true, 1))), FrameFate::kApplied);
+  EXPECT_EQ(apply(of(4, frame(8, false, 2))), FrameFate::kApplied);
+  const auto before = player_->take_news().picture;
+  EXPECT_EQ(apply(of(5, frame(9, false, 3))), FrameFate::kSkipped) << "though its number would follow";
+  EXPECT_TRUE(player_->key_frame_wanted());
+  EXPECT_EQ(player_->pages().slot(0), 2);
+  EXPECT_TRUE(player_->take_news().empty());
+  EXPECT_EQ(player_->picture().y, before->y) << "what is shown stays";
+  wire::StreamFrame key = of(5, frame(3, true, 9));
+  key.mutable_page_edits(0)->set_tile(1);
+  EXPECT_EQ(apply(key), FrameFate::kApplied) << "numbers are each stream's own";
+  EXPECT_EQ(player_->pages().slot(0), kAbsent) << "the whole table is that of the new stream";
+  EXPECT_EQ(player_->pages().slot(1), 9);
+  EXPECT_FALSE(player_->take_news().fresh) << "of the same session";
+  EXPECT_EQ(apply(of(5, frame(4, false, 6))), FrameFate::kApplied);
+}
+
 TEST_F(Player, NewsAreNoneBeforeTheFirstFrameAndTheFirstSaySo) {
   open(false);
   EXPECT_TRUE(player_->take_news().empty()) << "whoever shows the stream keeps what an earlier session left";

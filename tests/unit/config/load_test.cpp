@@ -66,6 +66,7 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.stream.max_writes, b.stream.max_writes);
   EXPECT_EQ(a.stream.crf, b.stream.crf);
   EXPECT_EQ(a.stream.crf_finest, b.stream.crf_finest);
+  EXPECT_EQ(a.stream.share, b.stream.share);
   EXPECT_EQ(a.stream.preset, b.stream.preset);
   EXPECT_EQ(a.stream.chroma_444, b.stream.chroma_444);
   EXPECT_EQ(a.stream.allow_lossless, b.stream.allow_lossless);

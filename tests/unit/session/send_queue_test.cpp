@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <tuple>
 
 namespace darm::session {
 namespace {
@@ -86,6 +87,70 @@ TEST(SendQueue, the_layers_lose_pictures_each_for_itself) {
   while (!taker.take(q, 900'002).empty()) q.sent();
   EXPECT_EQ(taker.frames, (std::vector<FrameNumber>{1, 8}));
   EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 0}));
+}
+
+std::shared_ptr<const EncodedFrame> of_stream(std::uint32_t stream, FrameNumber number, bool key) {
+  auto f = std::make_shared<EncodedFrame>(*picture(number, key));
+  f->stream = StreamId{stream};
+  return f;
+}
+
+TEST(SendQueue, of_another_stream_no_picture_is_sent_before_its_key_frame) {
+  SendQueue q{SendLimits{}};
+  Taker taker;
+  EXPECT_TRUE(q.push_picture(of_stream(1, 5, true), answer(1), 0));
+  taker.take(q, 0);
+  q.sent();
+  EXPECT_FALSE(q.push_picture(of_stream(2, 6, false), answer(2), 10)) << "though its number would follow";
+  EXPECT_FALSE(q.ask_for_key(10)) << "whoever comes to a stream is made one";
+  EXPECT_TRUE(q.push_picture(of_stream(2, 7, true), answer(0), 20));
+  EXPECT_TRUE(q.push_picture(of_stream(2, 8, false), answer(3), 30));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 6, false), answer(0), 31)) << "a late one of the stream before";
+  EXPECT_TRUE(q.push_picture(of_stream(2, 9, false), answer(0), 40)) << "it does no harm";
+  while (!taker.take(q, 50).empty()) q.sent();
+  EXPECT_EQ(taker.frames, (std::vector<FrameNumber>{5, 7, 8, 9}));
+  EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 2, 3, 0})) << "no answer is lost";
+}
+
+TEST(SendQueue, who_comes_back_to_a_stream_needs_its_key_frame_too) {
+  SendQueue q{SendLimits{}};
+  EXPECT_TRUE(q.push_picture(of_stream(1, 5, true), answer(0), 0));
+  EXPECT_FALSE(q.push_picture(of_stream(2, 9, false), answer(0), 1));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 8, false), answer(0), 2)) << "6 and 7 went to others";
+  EXPECT_TRUE(q.push_picture(of_stream(1, 9, true), answer(0), 3));
+}
+
+TEST(SendQueue, the_key_frame_of_another_stream_replaces_what_waits) {
+  SendQueue q{SendLimits{}};
+  Taker taker;
+  EXPECT_TRUE(q.push_picture(of_stream(1, 5, true), answer(1), 0));
+  EXPECT_TRUE(q.push_picture(of_stream(1, 6, false), answer(2), 0));
+  EXPECT_TRUE(q.push_picture(of_stream(2, 3, true), answer(0), 1));
+  while (!taker.take(q, 2).empty()) q.sent();
+  EXPECT_EQ(taker.frames, std::vector<FrameNumber>{3});
+  EXPECT_EQ(taker.answers, std::vector<CameraSequence>{2});
+}
+
+TEST(SendQueue, a_key_frame_of_the_new_stream_that_does_not_come_is_asked_for) {
+  SendQueue q{SendLimits{}};
+  EXPECT_FALSE(q.push_picture(of_stream(1, 5, false), answer(0), 0)) << "a late joiner has none at all";
+  EXPECT_FALSE(q.ask_for_key(0));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 6, false), answer(0), 999'999));
+  EXPECT_FALSE(q.ask_for_key(999'999));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 7, false), answer(0), 1'000'000));
+  EXPECT_TRUE(q.ask_for_key(1'000'000));
+  EXPECT_TRUE(q.push_picture(of_stream(1, 8, true), answer(0), 1'000'001));
+}
+
+TEST(SendQueue, a_key_frame_turned_away_for_geometry_is_asked_for_again_at_once) {
+  SendQueue q{SendLimits{}};
+  Taker taker;
+  q.push_bulk(bytes(5));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 5, false), answer(0), 0));
+  EXPECT_FALSE(q.push_picture(of_stream(1, 6, true), answer(0), 1));
+  taker.take(q, 2);
+  q.sent();
+  EXPECT_TRUE(q.ask_for_key(2));
 }
 
 using Sizes = std::vector<std::size_t>;
@@ -235,15 +300,19 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
     limits.media_age = 30;
     limits.media_bytes = 500;
     SendQueue q{limits};
-    std::vector<std::pair<FrameNumber, bool>> out;
+    std::vector<std::tuple<FrameNumber, bool, StreamId>> out;
     Microseconds now = 0;
     bool busy = false;
     bool want_key = false;
+    std::uint32_t stream = 1;
     for (FrameNumber n = 1; n < 200; ++n) {
       now += random() % 20;
       const bool key = want_key || random() % 20 == 0;
       want_key = false;
-      q.push_picture(picture(n, key, 50 + random() % 200), answer(0), now);
+      if (random() % 30 == 0) stream = 1 + random() % 3;
+      auto f = std::make_shared<EncodedFrame>(*picture(n, key, 50 + random() % 200));
+      f->stream = StreamId{stream};
+      q.push_picture(f, answer(0), now);
       if (random() % 10 == 0) q.require_key();
       if (random() % 30 == 0) q.push_bulk(bytes(1));
       if (random() % 10 == 0) q.push_background(bytes(1));
@@ -256,7 +325,7 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
         busy = !q.take(
                      now,
                      [&](const auto& f, const ViewAnswer&) {
-                       out.emplace_back(f->frame, f->key);
+                       out.emplace_back(f->frame, f->key, f->stream);
                        return bytes(1);
                      },
                      [](const NoChange&) { return bytes(1); })
@@ -264,9 +333,11 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
       }
     }
     FrameNumber last = 0;
-    for (const auto& [number, key] : out) {
-      ASSERT_TRUE(key || number == last + 1) << "frame " << number << " after " << last;
+    StreamId of{};
+    for (const auto& [number, key, from] : out) {
+      ASSERT_TRUE(key || (number == last + 1 && from == of)) << "frame " << number << " after " << last;
       last = number;
+      of = from;
     }
   }
 }

@@ -319,12 +319,14 @@ TEST_F(SessionProtocolTest, frames_carry_picture_table_answer_and_stamps) {
   frame->frame = 12;
   frame->key = true;
   frame->h264 = {9, 8, 7};
-  frame->error = 0.5f;
+  frame->stream = StreamId{7};
+  frame->error = 0.25f;  // of all who share the stream
   auto coverage = std::make_shared<CoverageTile>();
   coverage->fill(200);
   frame->edits.push_back({TileId(2, 34), 56, coverage, nullptr});
   ViewAnswer answer;
   answer.sequence = 4;
+  answer.error = 0.5f;
   answer.stamps.camera_received = 11;
   answer.stamps.encoded = 22;
   (void)protocol->on_frame(FrameEncoded(frame, answer), 30);
@@ -335,7 +337,8 @@ TEST_F(SessionProtocolTest, frames_carry_picture_table_answer_and_stamps) {
   EXPECT_TRUE(f.key());
   EXPECT_EQ(f.h264(), std::string("\x09\x08\x07"));
   EXPECT_EQ(f.answers(), 4u);
-  EXPECT_FLOAT_EQ(f.error(), 0.5f);
+  EXPECT_EQ(f.stream(), 7u);
+  EXPECT_FLOAT_EQ(f.error(), 0.5f) << "of this view";
   EXPECT_EQ(f.stamps().camera_received(), 11);
   EXPECT_EQ(f.stamps().encoded(), 22);
   EXPECT_EQ(f.stamps().sent(), 33);

@@ -183,18 +183,45 @@ TEST(StreamState, AFailedFrameIsAnsweredAgainByAKeyFrame) {
   EXPECT_EQ(second.frame->answers[0].sequence, 1u);
 }
 
-TEST(StreamState, AFrameThatIsNeverReportedDoneIsGivenUp) {
-  StreamOptions options;
-  options.lost_after = 100;
-  StreamState stream(small(), options);
+// A hundred streams once made a thousand key frames in a minute: theirs had only waited in the encoder's queue.
+TEST(StreamState, AFrameIsWaitedForHoweverLongItTakes) {
+  StreamState stream(small(), {});
   Images images;
   ASSERT_TRUE(stream.step({}, images.lookup(), 0, 0).frame);
-  EXPECT_FALSE(stream.step({}, images.lookup(), 0, 99).frame);
-  auto again = stream.step({}, images.lookup(), 0, 100);
+  EXPECT_FALSE(stream.step({}, images.lookup(), 0, 3'600'000'000).frame);
+  EXPECT_TRUE(stream.in_flight());
+}
+
+TEST(StreamState, AFrameGoesWithItsEncoder) {
+  StreamState stream(small(), {});
+  Images images;
+  ASSERT_TRUE(stream.step({}, images.lookup(), 0, 0).frame);
+  stream.encoder_gone();
+  auto again = stream.step({}, images.lookup(), 0, 1);
   ASSERT_TRUE(again.frame);
   EXPECT_TRUE(again.frame->key);
   stream.frame_done(1, true);
   EXPECT_TRUE(stream.in_flight()) << "a late report of the lost frame ends nothing";
+}
+
+TEST(StreamState, ASessionThatGoesTakesWhatItWasNotAnswered) {
+  StreamState stream(small(), {});
+  Images images;
+  const auto answer = [](std::uint64_t session, CameraSequence sequence) {
+    ViewAnswer a;
+    a.session = SessionId{session};
+    a.sequence = sequence;
+    return a;
+  };
+  stream.view_ready(answer(1, 4));
+  stream.view_ready(answer(2, 7));
+  ASSERT_EQ(stream.step({}, images.lookup(), 0, 0).frame->answers.size(), 2u);
+  stream.view_ready(answer(2, 8));
+  EXPECT_EQ(stream.forget_session(SessionId{1})->sequence, 4u) << "in a frame that it may not get";
+  EXPECT_EQ(stream.forget_session(SessionId{2})->sequence, 8u);
+  EXPECT_FALSE(stream.forget_session(SessionId{2}));
+  stream.frame_done(1, false);
+  EXPECT_TRUE(stream.step({}, images.lookup(), 0, 1).frame->answers.empty());
 }
 
 TEST(StreamState, NewTilesComeBeforeRefinementsWithinTheLimit) {

@@ -33,13 +33,15 @@ function inflateSlot(packed: Uint8Array, bytes: number, what: string): Uint8Arra
 
 /**
  * A gap in the frame numbers or a picture that does not decode skips frames until the next key frame (`keyWanted`); a
- * message that contradicts the manifest throws Refused: the server is not to be trusted.
+ * message that contradicts the manifest throws Refused: the server is not to be trusted. The server may go over to
+ * another of its streams: with a key frame, which replaces what there was; until it is there the picture stays.
  */
 export class StreamPlayer {
   keyWanted = true;
   framesLost = 0;
   lastFrame = 0;
   private fresh = true;
+  private stream = 0n;  // of the last frame
   private readonly pages: PageTable;
   private readonly slots: number;
   private readonly slotTile: Int32Array;  // whose coverage lies in the slot
@@ -62,7 +64,8 @@ export class StreamPlayer {
   /** Calls must not overlap. Null: skipped. */
   async apply(frame: StreamFrame): Promise<FrameUpdate | null> {
     const number = Number(frame.frame);
-    if (!frame.key && (this.keyWanted || number !== this.lastFrame + 1)) return this.loseTrack();
+    const follows = frame.stream === this.stream && number === this.lastFrame + 1;
+    if (!frame.key && (this.keyWanted || !follows)) return this.loseTrack();
     const edits = this.readEdits(frame, number);
     if (frame.pixels.length > 0) throw new Refused(`frame ${number}: bare pixels on a coded stream`);
     let picture: Planes | null = null;
@@ -78,6 +81,7 @@ export class StreamPlayer {
         throw new Refused(`frame ${number}: picture is ${picture.width}x${picture.height}, not the size agreed`);
       }
     }
+    this.stream = frame.stream;
     return this.commit(frame.key, number, edits, picture);
   }
 
