@@ -8,8 +8,8 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 HELP = ROOT / "daemon/observe/metric_help.cpp"
 MEASURE = {"count": "counter", "observe": "histogram", "set": "gauge"}
-# A call may hold its name on the next line, or in a constant.
-CALL = re.compile(r"\b(count|observe|set)\(\s*\"(darm_\w+)\"")
+# A call may hold its name on the next line, choose between two, or have it in a constant.
+CALL = re.compile(r"\b(count|observe|set)\(([^;]*?\"darm_\w+\"[^;]*);")
 CONSTANT = re.compile(r"constexpr const char\* \w+ = \"(darm_\w+)\"")
 
 
@@ -19,10 +19,11 @@ def measured():
     for folder in ("actors", "daemon"):
         for path in sorted((ROOT / folder).rglob("*.cpp")):
             text = path.read_text()
-            for method, name in CALL.findall(text):
+            for method, arguments in CALL.findall(text):
                 kind = MEASURE[method]
-                if kinds.setdefault(name, kind) != kind:
-                    faults.append(f"{path.relative_to(ROOT)}: {name} is a {kinds[name]} elsewhere, a {kind} here")
+                for name in re.findall(r"\"(darm_\w+)\"", arguments):
+                    if kinds.setdefault(name, kind) != kind:
+                        faults.append(f"{path.relative_to(ROOT)}: {name} is a {kinds[name]} elsewhere, a {kind} here")
             for name in CONSTANT.findall(text):
                 kinds.setdefault(name, "counter")
     return kinds, faults

@@ -23,16 +23,6 @@ std::uint64_t mix(std::uint64_t x) {
 
 std::uint64_t mark(std::uint32_t entry, std::uint16_t slot) { return mix(std::uint64_t{entry} << 16 | slot); }
 
-// Servers that know of shared streams say which one a frame is of; a protocol without that field has one.
-template <class Frame>
-std::uint64_t stream_of(const Frame& frame) {
-  if constexpr (requires { frame.stream(); }) {
-    return frame.stream();
-  } else {
-    return 0;
-  }
-}
-
 }  // namespace
 
 StreamCheck::StreamCheck(std::shared_ptr<const SceneModel> scene, const StreamShape& shape)
@@ -48,7 +38,7 @@ FrameNews StreamCheck::take(const wire::StreamFrame& frame, FaultCounts& faults)
   if (!in_order(frame, faults, news)) return news;
   if (frame.key()) clear();
   apply_edits(frame, faults);
-  stream_ = stream_of(frame);
+  stream_ = frame.stream();
   last_ = frame.frame();
   begun_ = true;
   lost_ = false;
@@ -57,7 +47,7 @@ FrameNews StreamCheck::take(const wire::StreamFrame& frame, FaultCounts& faults)
 }
 
 bool StreamCheck::in_order(const wire::StreamFrame& frame, FaultCounts& faults, FrameNews& news) {
-  const bool same_stream = !begun_ || stream_of(frame) == stream_;
+  const bool same_stream = !begun_ || frame.stream() == stream_;
   if (frame.key()) {
     // Numbers of another stream have nothing to do with those before.
     if (begun_ && same_stream && frame.frame() > last_ + 1) news.dropped = frame.frame() - last_ - 1;
