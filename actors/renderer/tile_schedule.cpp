@@ -42,17 +42,38 @@ void TileSchedule::replace(const std::vector<TileRequest>& work, const std::func
   tiles_ = std::move(next);
 }
 
-bool TileSchedule::finished(const State& s) const {
-  if (s.progress.texels == 0 || s.progress.least >= static_cast<float>(options_.max_samples)) return true;
+// Its neighbours in the atlas, without itself.
+std::vector<TileId> TileSchedule::beside_of(TileId tile) const {
+  std::vector<TileId> out;
+  if (static_cast<std::size_t>(tile.level()) >= levels_.size()) return out;
+  for (int d = 0; d < 9; ++d) {
+    const auto other = neighbour_of(tile, levels_[static_cast<std::size_t>(tile.level())], d % 3 - 1, d / 3 - 1);
+    if (other && *other != tile) out.push_back(*other);
+  }
+  return out;
+}
+
+bool TileSchedule::on_target(const State& s) const {
   return s.target_error > 0 && s.error >= 0 && s.error <= s.target_error && s.progress.unshaded == 0 &&
          s.pictured_mean >= kLeastForTarget;
 }
 
-TileSchedule::Need TileSchedule::need_of(const State& s) const {
+bool TileSchedule::finished(TileId tile, const State& s) const {
+  if (s.progress.texels == 0 || s.progress.least >= static_cast<float>(options_.max_samples)) return true;
+  if (s.display) return on_target(s);
+  // It has no picture, so no error of its own: it is as exact as those it borders need.
+  if (!(s.target_error > 0) || s.progress.mean < kLeastForTarget) return false;
+  return std::ranges::none_of(beside_of(tile), [&](TileId beside) {
+    const auto it = tiles_.find(beside);
+    return it != tiles_.end() && it->second.display && !on_target(it->second);
+  });
+}
+
+TileSchedule::Need TileSchedule::need_of(TileId tile, const State& s) const {
   if (s.quarantined || s.mask.empty()) return Need::kNothing;
   if (!s.surveyed) return s.stored ? Need::kSurvey : Need::kFirst;
   if (s.progress.unshaded > 0) return Need::kFirst;
-  return finished(s) ? Need::kNothing : Need::kMore;
+  return finished(tile, s) ? Need::kNothing : Need::kMore;
 }
 
 // Weight times the fall of squared display error, over the price in samples. A first pass takes the place of the coarse
@@ -101,7 +122,7 @@ std::vector<TileJob> TileSchedule::next_batch(std::uint64_t samples) {
   std::vector<Candidate> candidates;
   candidates.reserve(tiles_.size());
   for (const auto& [tile, state] : tiles_)
-    if (const Need need = need_of(state); need != Need::kNothing)
+    if (const Need need = need_of(tile, state); need != Need::kNothing)
       candidates.push_back({need, gain_of(tile, state, need), tile, &state});
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     if ((a.need == Need::kSurvey) != (b.need == Need::kSurvey)) return a.need == Need::kSurvey;
@@ -132,13 +153,10 @@ void TileSchedule::shaded(TileId tile, const TileProgress& progress, std::uint32
   s.surveyed = true;
   s.stored = s.stored || samples > 0;
   s.failures = 0;
-  if (!first_light || static_cast<std::size_t>(tile.level()) >= levels_.size()) return;
-  for (int d = 0; d < 9; ++d) {
-    const auto other = neighbour_of(tile, levels_[static_cast<std::size_t>(tile.level())], d % 3 - 1, d / 3 - 1);
-    if (!other || *other == tile) continue;
-    if (const auto n = tiles_.find(*other); n != tiles_.end() && n->second.pictured_mean >= 0)
+  if (!first_light) return;
+  for (const auto beside : beside_of(tile))
+    if (const auto n = tiles_.find(beside); n != tiles_.end() && n->second.pictured_mean >= 0)
       n->second.stale_border = true;
-  }
 }
 
 bool TileSchedule::failed(TileId tile) {
@@ -154,7 +172,7 @@ std::vector<TileId> TileSchedule::pictures_due() const {
   std::vector<TileId> borders;
   bool calm = true;
   for (const auto& [tile, s] : tiles_) {
-    const Need need = need_of(s);
+    const Need need = need_of(tile, s);
     calm = calm && need != Need::kFirst && need != Need::kSurvey;
     if (!s.display || s.quarantined || s.progress.mean <= 0) continue;
     const bool last = need == Need::kNothing && s.progress.mean > s.pictured_mean * 1.05f;

@@ -81,8 +81,10 @@ class TileSchedule {
     float error = -1;          // of the last picture
   };
   enum class Need { kNothing, kSurvey, kFirst, kMore };
-  [[nodiscard]] Need need_of(const State& s) const;
-  [[nodiscard]] bool finished(const State& s) const;
+  [[nodiscard]] std::vector<TileId> beside_of(TileId tile) const;
+  [[nodiscard]] Need need_of(TileId tile, const State& s) const;
+  [[nodiscard]] bool on_target(const State& s) const;
+  [[nodiscard]] bool finished(TileId tile, const State& s) const;
   [[nodiscard]] double gain_of(TileId tile, const State& s, Need need) const;
   [[nodiscard]] TileJob job_for(TileId tile, const State& s, Need need) const;
 

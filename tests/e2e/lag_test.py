@@ -1,8 +1,7 @@
 """The time from a camera to the picture drawn for it is told by stage, and the stages make up the whole."""
 import unittest
-from pathlib import Path
 
-from running import SOURCE, Daemon, Folder, probe
+from running import SOURCE, WithDaemon, probe
 
 from slow_link import SlowLink
 
@@ -10,21 +9,14 @@ from slow_link import SlowLink
 SLACK = 2.0
 
 
-class Lag(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = Folder()
-        path = Path(cls.folder.__enter__())
-        cls.daemon = Daemon(path / "state", q=32)
-        cls.out = path / "picture.png"
-        cls.walk = SOURCE / "config/walkthroughs/default.json"
+class Lag(WithDaemon):
+    q = 32
 
     @classmethod
-    def tearDownClass(cls):
-        code = cls.daemon.stop()
-        cls.folder.__exit__()
-        if code != 0:
-            raise AssertionError(f"the daemon stopped with {code}")
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.out = cls.path / "picture.png"
+        cls.walk = SOURCE / "config/walkthroughs/default.json"
 
     def lag(self, port, *more):
         report = probe(port, self.out, "--walkthrough", self.walk, "--seconds", "8", "--lag", *more, size="320x180")

@@ -2,9 +2,8 @@
 import json
 import subprocess
 import unittest
-from pathlib import Path
 
-from running import BIN, SET_UP, SOURCE, Daemon, Folder
+from running import BIN, SET_UP, SOURCE, WithDaemon
 
 WALK = SOURCE / "config/walkthroughs/default.json"
 KEYS = ("clients connected updates_per_second stream_frames_per_second no_changes_per_second integrity_faults "
@@ -12,20 +11,7 @@ KEYS = ("clients connected updates_per_second stream_frames_per_second no_change
         "server_rss_bytes bytes_per_client_per_second key_frames frames_dropped disconnects").split()
 
 
-class Load(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = Folder()
-        cls.path = Path(cls.folder.__enter__())
-        cls.daemon = Daemon(cls.path / "state")
-
-    @classmethod
-    def tearDownClass(cls):
-        code = cls.daemon.stop()
-        cls.folder.__exit__()
-        if code != 0:
-            raise AssertionError(f"the daemon stopped with {code}")
-
+class Load(WithDaemon):
     def load(self, *more, port=None):
         return subprocess.run(
             [BIN / "darm-load", f"127.0.0.1:{port or self.daemon.tcp}", "--width", "320", "--height", "180", *more],

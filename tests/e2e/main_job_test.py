@@ -1,37 +1,19 @@
 """A client at the other end of a socket shows the picture of the path tracer."""
 import subprocess
 import unittest
-import urllib.request
-from pathlib import Path
 
-from running import BIN, Daemon, Folder, SET_UP, probe, reference, wait_until
+from running import BIN, SET_UP, WithDaemon, probe, reference, wait_until
 
 KEYS = ["psnr", "mssim", "ceiling_psnr", "ceiling_mssim", "reference_psnr", "seconds_to_first_image",
         "bytes_to_first_image", "coarser_fraction", "coarse_fraction", "frames", "no_changes", "latency_ms", "series"]
 
 
-class MainJob(unittest.TestCase):
+class MainJob(WithDaemon):
     @classmethod
     def setUpClass(cls):
-        cls.folder = Folder()
-        path = cls.folder.__enter__()
-        cls.reference = reference(path)
-        cls.daemon = Daemon(Path(path) / "state")
-        cls.out = Path(path) / "picture.png"
-
-    @classmethod
-    def tearDownClass(cls):
-        code = cls.daemon.stop()
-        cls.folder.__exit__()
-        if code != 0:
-            raise AssertionError(f"the daemon stopped with {code}")
-
-    def metric(self, name):
-        with urllib.request.urlopen(f"http://127.0.0.1:{self.daemon.metrics}/metrics", timeout=5) as page:
-            for line in page.read().decode().splitlines():
-                if line.startswith(name + " "):
-                    return float(line.split()[-1])
-        return None
+        super().setUpClass()
+        cls.reference = reference(cls.path)
+        cls.out = cls.path / "picture.png"
 
     def test_the_picture_matches_the_reference_and_the_report_holds_its_keys(self):
         report = probe(self.daemon.tcp, self.out, "--seconds", "8", "--reference", self.reference,
@@ -63,8 +45,8 @@ class MainJob(unittest.TestCase):
         self.assertLessEqual(rough["error"], 0.05)
         plain = probe(self.daemon.tcp, self.out, "--seconds", "1", camera="windows", size="160x90")
         self.assertAlmostEqual(plain["target_error"], 0.002, places=6)
-        self.assertGreater(self.metric("darm_view_error_count"), 0)
-        self.assertIsNotNone(self.metric("darm_views_on_target"))
+        self.assertGreater(self.daemon.values()["darm_view_error_count"], 0)
+        self.assertIn("darm_views_on_target", self.daemon.values())
 
     def test_tls_is_spoken_with_a_server_that_is_vouched_for(self):
         with self.assertRaisesRegex(AssertionError, "certificate"):
@@ -84,7 +66,7 @@ class MainJob(unittest.TestCase):
         closed = lambda: self.daemon.messages().count(": closed")
         wait_until(lambda: opened() > 0 and opened() == closed(), 20, "every opened session closed")
         for kind in ("session", "encoder"):
-            wait_until(lambda: self.metric('darm_actors{actor="%s"}' % kind) == 0, 20, f"every {kind} gone")
+            wait_until(lambda: self.daemon.values()['darm_actors{actor="%s"}' % kind] == 0, 20, f"every {kind} gone")
 
     def test_a_stranger_hears_one_clear_error(self):
         error = probe(1, self.out, "--seconds", "1", check=False)

@@ -4,18 +4,12 @@ import re
 import shutil
 import subprocess
 import unittest
-import urllib.request
 from pathlib import Path
 
 from running import SOURCE, Daemon, Folder, probe
 
 PROMTOOL = shutil.which("promtool")
 NAME = re.compile(r"\b(darm_\w+)")
-
-
-def scrape(daemon):
-    with urllib.request.urlopen(f"http://127.0.0.1:{daemon.metrics}/metrics", timeout=5) as page:
-        return page.read().decode()
 
 
 def expressions():
@@ -32,7 +26,7 @@ class Metrics(unittest.TestCase):
             daemon = Daemon(Path(folder) / "state")
             try:
                 probe(daemon.tcp, Path(folder) / "picture.png", "--seconds", "4")
-                cls.text = scrape(daemon)
+                cls.text = daemon.scrape()
             finally:
                 daemon.stop()
 

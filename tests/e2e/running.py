@@ -8,6 +8,8 @@ import subprocess
 import sys
 import tempfile
 import time
+import unittest
+import urllib.request
 from pathlib import Path
 
 BIN = Path(os.environ["DARM_BIN"])
@@ -38,6 +40,16 @@ class Daemon:
         self.log.seek(0)
         return self.log.read()
 
+    def scrape(self):
+        """The text at /metrics."""
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.metrics}/metrics", timeout=5) as page:
+            return page.read().decode()
+
+    def values(self):
+        """The metrics there, by name and labels."""
+        lines = [line.split() for line in self.scrape().splitlines() if not line.startswith("#")]
+        return {line[0]: float(line[1]) for line in lines if len(line) == 2}
+
     def stop(self, number=signal.SIGTERM):
         self.process.send_signal(number)
         code = self.process.wait(timeout=20)
@@ -54,6 +66,13 @@ def probe(port, out, *more, check=True, camera="hall", size="320x180", set_up=SE
     if check and done.returncode != 0:
         raise AssertionError("darm-probe: " + done.stderr + done.stdout)
     return json.loads(done.stdout) if done.returncode == 0 else done.stderr
+
+
+def start_probe(port, camera, out, seconds, *more, size="320x180", set_up=SET_UP):
+    """A darm-probe that goes on beside the test; its report will be on its standard output."""
+    return subprocess.Popen(
+        [BIN / "darm-probe", "--server", f"127.0.0.1:{port}", "--setup", set_up, "--camera", camera, "--size", size,
+         "--seconds", str(seconds), "--out", out, "--json", *more], stdout=subprocess.PIPE, text=True)
 
 
 def reference(folder, camera="hall", size="320x180", spp=32, effects="view-independent", name="reference"):
@@ -85,3 +104,22 @@ class Folder:
 
     def __exit__(self, *_):
         shutil.rmtree(self.path, ignore_errors=True)
+
+
+class WithDaemon(unittest.TestCase):
+    """One daemon and one temporary folder (`path`) for all tests of a class."""
+
+    q = 16
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Folder()
+        cls.path = Path(cls.folder.__enter__())
+        cls.daemon = Daemon(cls.path / "state", q=cls.q)
+
+    @classmethod
+    def tearDownClass(cls):
+        code = cls.daemon.stop()
+        cls.folder.__exit__()
+        if code != 0:
+            raise AssertionError(f"the daemon stopped with {code}")

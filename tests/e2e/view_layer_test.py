@@ -1,28 +1,14 @@
 """Two clients before one mirror see each their own reflection; where nothing reflects, nothing of this runs."""
 import json
 import struct
-import subprocess
 import unittest
-import urllib.request
 from pathlib import Path
 
-from running import BIN, Daemon, Folder, probe, reference
+from running import Daemon, Folder, probe, reference, start_probe
 
 # The default scene's mirror and copper ball, from two sides.
 ANN, BOB = "-3,1.6,-1.6 -6,1.6,0.1 45", "-3,1.9,1.4 -6,1.5,-0.1 45"
 SIZE = "160x90"
-
-
-def metrics(daemon):
-    with urllib.request.urlopen(f"http://127.0.0.1:{daemon.metrics}/metrics", timeout=5) as page:
-        lines = [line.split() for line in page.read().decode().splitlines() if not line.startswith("#")]
-    return {line[0]: float(line[1]) for line in lines if len(line) == 2}
-
-
-def start_probe(daemon, camera, out, seconds, *more):
-    return subprocess.Popen(
-        [BIN / "darm-probe", "--server", f"127.0.0.1:{daemon.tcp}", "--camera", camera, "--size", SIZE, "--seconds",
-         str(seconds), "--out", out, "--json", *more], stdout=subprocess.PIPE, text=True)
 
 
 def matte_room(path):
@@ -55,7 +41,7 @@ class ViewLayer(unittest.TestCase):
                           for c, n in ((ANN, "ann"), (BOB, "bob"))]
             daemon = Daemon(Path(path) / "state")
             try:
-                clients = [start_probe(daemon, c, f"{path}/{i}.png", 15, "--reference", str(r))
+                clients = [start_probe(daemon.tcp, c, f"{path}/{i}.png", 15, "--reference", str(r), size=SIZE)
                            for i, (c, r) in enumerate(zip((ANN, BOB), references))]
                 reports = [json.loads(c.communicate(timeout=90)[0]) for c in clients]
                 for report in reports:
@@ -69,7 +55,7 @@ class ViewLayer(unittest.TestCase):
                                 "--view-phystex", "0", camera=ANN, size=SIZE)
                 self.assertEqual(without["view_phystex_size"], 0)
                 self.assertLess(without["psnr"], reports[0]["psnr"] - 3.0)
-                self.assertGreater(metrics(daemon)["darm_view_samples_total"], 0)
+                self.assertGreater(daemon.values()["darm_view_samples_total"], 0)
             finally:
                 self.assertEqual(daemon.stop(), 0)
 
@@ -81,7 +67,7 @@ class ViewLayer(unittest.TestCase):
                 self.assertGreater(report["frames"], 0)
                 self.assertEqual(report["view_phystex_size"], 0)
                 self.assertEqual(report["view_bytes"], 0)
-                shown = metrics(daemon)
+                shown = daemon.values()
                 for name in ("samples", "frames", "bytes", "pictures"):
                     self.assertNotIn(f"darm_view_{name}_total", shown)
                 self.assertFalse([n for n in shown if n.startswith("darm_actors") and "view" in n], shown)

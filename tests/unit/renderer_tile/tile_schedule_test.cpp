@@ -195,6 +195,28 @@ TEST_F(TileScheduleTest, border_tiles_are_shaded_but_have_no_picture) {
   EXPECT_EQ(publish(), std::vector<std::uint32_t>{1});
 }
 
+TEST_F(TileScheduleTest, border_tiles_rest_once_those_they_border_are_on_target) {
+  auto shown = request(1, 0.1f), border = request(2, 0.1f, false);
+  shown.target_error = border.target_error = 0.02f;
+  schedule.replace({shown, border}, nothing_stored);
+  for (int i = 0; i < 200; ++i) {
+    run(1000);
+    publish(0.1f);
+  }
+  EXPECT_GT(counts[TileId(0, 2)], 100.0f) << "its neighbour is not exact enough";
+  const float before = counts[TileId(0, 2)];
+  schedule.pictured(TileId(0, 1), 0.01f);
+  EXPECT_TRUE(schedule.next_batch(1000).empty());
+  EXPECT_EQ(counts[TileId(0, 2)], before);
+}
+
+TEST_F(TileScheduleTest, border_tiles_without_a_target_go_on) {
+  schedule.replace({request(2, 0.1f, false)}, nothing_stored);
+  for (int i = 0; i < 12; ++i) run(1000);
+  EXPECT_GE(counts[TileId(0, 2)], 16.0f);
+  EXPECT_FALSE(schedule.next_batch(1000).empty());
+}
+
 TEST_F(TileScheduleTest, tile_that_fails_twice_is_left_alone) {
   schedule.replace({request(1, 0.1f)}, nothing_stored);
   EXPECT_TRUE(schedule.failed(TileId(0, 1)));
