@@ -22,9 +22,9 @@ struct AllocationOptions {
 };
 
 struct AllocationRequest {
-  std::span<const WeightedChain> chains;  ///< distinct chains, weights >= 0
-  std::span<const TileId> residents;      ///< distinct tiles
-  std::function<bool(TileId)> available;  ///< tiles that may be granted; null: all
+  std::span<const WeightedChain> chains;    ///< distinct chains, weights >= 0
+  std::span<const TileId> residents;        ///< distinct tiles
+  std::function<bool(TileId)> available{};  ///< tiles that may be granted; null: all
   /// measure_losses(): parallel to `chains`, rising with the position. Empty: not known, serving_loss() stands in.
   std::span<const ChainLoss> losses;
   std::size_t slots = 0;

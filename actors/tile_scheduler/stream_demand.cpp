@@ -4,6 +4,8 @@
 #include <numeric>
 #include <utility>
 
+#include "actors/tile_scheduler/falling_weight.hpp"
+
 namespace darm::tile_scheduler {
 namespace {
 
@@ -18,9 +20,7 @@ class WeightedTiles {
   void sorted(std::vector<TileId>& tiles, std::vector<float>& weights) const {
     std::vector<std::uint32_t> order(weights_.size());
     std::iota(order.begin(), order.end(), 0u);
-    std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
-      return weights_[a] != weights_[b] ? weights_[a] > weights_[b] : tiles_.keys()[a] < tiles_.keys()[b];
-    });
+    sort_by_falling_weight(order, tiles_.keys(), [&](std::uint32_t i) { return weights_[i]; });
     for (const auto number : order) {
       tiles.push_back(tiles_.keys()[number]);
       weights.push_back(weights_[number]);
@@ -45,17 +45,6 @@ Allocation part_of(const Allocation& all, const ViewDemand& view, std::span<cons
   }
   tiles.sorted(out.tiles, out.weights);
   return out;
-}
-
-AllocationRequest request_of(const JointView& joint, std::span<const TileId> residents, std::size_t slots,
-                             int coarse_level) {
-  AllocationRequest request;
-  request.chains = joint.chains;
-  request.losses = joint.losses;
-  request.residents = residents;
-  request.slots = slots;
-  request.coarse_level = coarse_level;
-  return request;
 }
 
 // Chains that no view has measured take the mean of those that are.
@@ -109,9 +98,13 @@ JointView join_views(std::span<const ViewDemand* const> views) {
 void share_slots(std::span<ViewDemand* const> views, const JointView& joint, const PageTable& table,
                  const ImageLookup& images, int coarse_level, const AllocationOptions& options) {
   const auto residents = table.residents();
-  auto request = request_of(joint, residents, table.capacity(), coarse_level);
-  request.exchange = joint.rests;
-  const auto target = allocate_slots(request, options);
+  const auto target = allocate_slots({.chains = joint.chains,
+                                      .residents = residents,
+                                      .losses = joint.losses,
+                                      .slots = table.capacity(),
+                                      .coarse_level = coarse_level,
+                                      .exchange = joint.rests},
+                                     options);
   for (std::size_t v = 0; v < views.size(); ++v) {
     views[v]->target = part_of(target, *views[v], joint.number[v]);
     views[v]->crowded = views[v]->joint = true;
@@ -128,13 +121,14 @@ void share_available(std::span<ViewDemand* const> views, const JointView& joint,
     return;
   }
   const auto residents = table.residents();
-  auto request = request_of(joint, residents, table.capacity(), coarse_level);
-  request.exchange = false;  // for the time being only
-  request.available = [&](TileId t) {
-    const auto* stored = images(t);
-    return stored != nullptr && stored->image != nullptr;
-  };
-  const auto granted = allocate_slots(request, options);
+  const auto granted = allocate_slots({.chains = joint.chains,
+                                       .residents = residents,
+                                       .available = [&](TileId t) { return has_image(images, t); },
+                                       .losses = joint.losses,
+                                       .slots = table.capacity(),
+                                       .coarse_level = coarse_level,
+                                       .exchange = false},  // for the time being only
+                                      options);
   for (std::size_t v = 0; v < views.size(); ++v) views[v]->granted = part_of(granted, *views[v], joint.number[v]);
 }
 

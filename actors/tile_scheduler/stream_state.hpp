@@ -25,6 +25,10 @@ struct StoredImage {
 };
 /// Null: the tile has no picture yet. The pointer is used before the next call only.
 using ImageLookup = std::function<const StoredImage*(TileId)>;
+[[nodiscard]] inline bool has_image(const ImageLookup& images, TileId tile) {
+  const auto* stored = images(tile);
+  return stored != nullptr && stored->image != nullptr;
+}
 
 struct StreamOptions {
   std::size_t max_writes = 2048;  ///< slots written per frame, key frames excepted; at least 1

@@ -312,7 +312,7 @@ void TileSchedulerActor::know_view(Session& session, ViewAnswer answer) {
 
 // The session's set has changed, or what its pictures show: slots are chosen anew.
 void TileSchedulerActor::reallocate(Session& session) {
-  const auto chains = session.set.chains();
+  auto chains = session.set.chains();
   groups_.put(session.id, session.format.shared_format(), significant_tiles(chains, options_.significant));
   auto& stream = *session.stream;
   const bool was_crowded = stream.crowded();
@@ -320,11 +320,11 @@ void TileSchedulerActor::reallocate(Session& session) {
   session.sharp = sharp_tiles(chains);
   stream.sharp.add(session.sharp);
   if (stream.crowded()) {
-    session.seen = seen_by(session.set, true, images(), coarse_.get(), layout_->coarse_level());
+    session.seen = seen_by(session.set, std::move(chains), true, images(), coarse_.get(), layout_->coarse_level());
     if (!was_crowded) return settle(stream);
     choose_together(stream);
   } else {
-    choose_alone(session);
+    choose_alone(session, std::move(chains));
     if (was_crowded) settle(stream);
   }
 }

@@ -50,8 +50,8 @@ struct SchedulerOptions {
   /// Least time between key frames for those who come to a stream: whoever comes meanwhile shares the next.
   Microseconds join_interval = 300'000;
   GroupOptions groups;
-  double significant =
-      0.98;               ///< streams are shared by what makes up so much of each view, coarser levels do for the rest
+  /// Streams are shared by the tiles that make up so much of each view; coarser levels do for the rest.
+  double significant = 0.98;
   double weighing = 0.5;  ///< of one processor: what choosing tiles for several crowded views at once may take
   WorkingSetOptions working_set;
   AllocationOptions allocation;
@@ -175,7 +175,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void leave(Session& session);
   void regroup();
   void settle(Stream& stream);
-  void choose_alone(Session& session);
+  void choose_alone(Session& session, std::vector<WeightedChain> chains);
   void choose_together(Stream& stream);
   void grant(Stream& stream);
   void note_weighed(Session& session);

@@ -78,11 +78,13 @@ void TileSchedulerActor::settle(Stream& stream) {
   work_changed_ = true;
   if (!stream.crowded()) {
     for (auto* member : stream.members)
-      if (member->seen || member->demand.joint || member->demand.chains.empty()) choose_alone(*member);
+      if (member->seen || member->demand.joint || member->demand.chains.empty())
+        choose_alone(*member, member->set.chains());
     return;
   }
   for (auto* member : stream.members)
-    if (!member->seen) member->seen = seen_by(member->set, true, images(), coarse_.get(), layout_->coarse_level());
+    if (!member->seen)
+      member->seen = seen_by(member->set, member->set.chains(), true, images(), coarse_.get(), layout_->coarse_level());
   stream.allocate_after = 0;
   choose_together(stream);
 }
@@ -98,11 +100,12 @@ void TileSchedulerActor::note_weighed(Session& session) {
 }
 
 // Where all sharp tiles fit, and where there is one view, it needs nothing of others.
-void TileSchedulerActor::choose_alone(Session& session) {
+void TileSchedulerActor::choose_alone(Session& session, std::vector<WeightedChain> chains) {
   const auto started = now_us();
+  const auto& table = session.stream->state.table();
   session.seen.reset();
-  session.demand =
-      demand_of(session.set, *layout_, session.stream->state.table(), images(), coarse_.get(), options_.allocation);
+  session.demand = demand_of(session.set, std::move(chains), session.sharp.size() > table.capacity(), *layout_, table,
+                             images(), coarse_.get(), options_.allocation);
   note_weighed(session);
   metrics_.observe("darm_allocation_seconds", double(now_us() - started) * 1e-6);
 }

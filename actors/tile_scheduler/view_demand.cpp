@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
+#include "actors/tile_scheduler/falling_weight.hpp"
 #include "actors/tile_scheduler/visibility.hpp"
 
 namespace darm::tile_scheduler {
@@ -93,9 +95,7 @@ std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, dou
   }
   std::vector<std::uint32_t> order(weights.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
-    return weights[a] != weights[b] ? weights[a] > weights[b] : tiles.keys()[a] < tiles.keys()[b];
-  });
+  sort_by_falling_weight(order, tiles.keys(), [&](std::uint32_t i) { return weights[i]; });
   std::vector<TileId> out;
   double sum = 0;
   for (const auto number : order) {
@@ -106,36 +106,16 @@ std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, dou
   return out;
 }
 
-ViewDemand seen_by(const WorkingSet& set, bool crowded, const ImageLookup& images, const CoarseLuma* coarse,
-                   int coarse_level) {
+ViewDemand seen_by(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded, const ImageLookup& images,
+                   const CoarseLuma* coarse, int coarse_level) {
   ViewDemand demand;
-  demand.chains = set.chains();
+  demand.chains = std::move(chains);
   demand.crowded = crowded;
   demand.rests = set.passes() >= kTapPasses;
   // The chains of the present pose come first in chains(), by the numbers that its taps use.
   if (crowded) demand.losses = measure_losses(demand.chains, set.current().taps(), images, coarse, coarse_level);
   return demand;
 }
-
-namespace {
-
-AllocationRequest allocation_request(const ViewDemand& demand, std::span<const TileId> residents, std::size_t slots,
-                                     int coarse_level) {
-  AllocationRequest request;
-  request.chains = demand.chains;
-  request.losses = demand.losses;
-  request.residents = residents;
-  request.slots = slots;
-  request.coarse_level = coarse_level;
-  return request;
-}
-
-bool has_image(const ImageLookup& images, TileId tile) {
-  const auto* stored = images(tile);
-  return stored != nullptr && stored->image != nullptr;
-}
-
-}  // namespace
 
 std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, const atlas::Layout& layout) {
   const auto& level = layout.levels.back();
@@ -155,16 +135,18 @@ std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, 
   return out;
 }
 
-ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
-                     const ImageLookup& images, const CoarseLuma* coarse, const AllocationOptions& options) {
-  auto demand = seen_by(set, false, images, coarse, layout.coarse_level());
-  demand.crowded = sharp_tiles(demand.chains).size() > table.capacity();
-  if (demand.crowded)
-    demand.losses = measure_losses(demand.chains, set.current().taps(), images, coarse, layout.coarse_level());
+ViewDemand demand_of(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded,
+                     const atlas::Layout& layout, const PageTable& table, const ImageLookup& images,
+                     const CoarseLuma* coarse, const AllocationOptions& options) {
+  auto demand = seen_by(set, std::move(chains), crowded, images, coarse, layout.coarse_level());
   const auto residents = table.residents();
-  auto request = allocation_request(demand, residents, table.capacity(), layout.coarse_level());
-  request.exchange = demand.rests;
-  demand.target = allocate_slots(request, options);
+  demand.target = allocate_slots({.chains = demand.chains,
+                                  .residents = residents,
+                                  .losses = demand.losses,
+                                  .slots = table.capacity(),
+                                  .coarse_level = layout.coarse_level(),
+                                  .exchange = demand.rests},
+                                 options);
   grant_available(demand, layout.coarse_level(), table, images, options);
   demand.requests = requests_of(set, layout, demand);
   if (coarse == nullptr) demand.coarse = coarse_texels_seen(set.current(), layout);
@@ -192,10 +174,14 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
     return;
   }
   const auto residents = table.residents();
-  auto request = allocation_request(demand, residents, table.capacity(), coarse_level);
-  request.exchange = false;  // for the time being only
-  request.available = [&](TileId t) { return has_image(images, t); };
-  demand.granted = allocate_slots(request, options);
+  demand.granted = allocate_slots({.chains = demand.chains,
+                                   .residents = residents,
+                                   .available = [&](TileId t) { return has_image(images, t); },
+                                   .losses = demand.losses,
+                                   .slots = table.capacity(),
+                                   .coarse_level = coarse_level,
+                                   .exchange = false},  // for the time being only
+                                  options);
 }
 
 float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse_level, bool has_coarse,

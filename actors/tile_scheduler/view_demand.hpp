@@ -39,19 +39,19 @@ struct ViewDemand {
 /// view show next to nothing of it.
 [[nodiscard]] std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, double share);
 
-/// What a view sees, without any decision; what coarser levels lose is measured if `crowded`.
-[[nodiscard]] ViewDemand seen_by(const WorkingSet& set, bool crowded, const ImageLookup& images,
-                                 const CoarseLuma* coarse, int coarse_level);
+/// What a view sees, without any decision; what coarser levels lose is measured if `crowded`. `chains`: set.chains().
+[[nodiscard]] ViewDemand seen_by(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded,
+                                 const ImageLookup& images, const CoarseLuma* coarse, int coarse_level);
 
 /// What must be shaded for `demand.target`; `set` is what `demand` was made from.
 [[nodiscard]] std::vector<renderer::TileRequest> requests_of(const WorkingSet& set, const atlas::Layout& layout,
                                                              const ViewDemand& demand);
 
-/// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. `coarse`:
-/// see measure_losses().
-[[nodiscard]] ViewDemand demand_of(const WorkingSet& set, const atlas::Layout& layout, const PageTable& table,
-                                   const ImageLookup& images, const CoarseLuma* coarse,
-                                   const AllocationOptions& options);
+/// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. `chains`:
+/// set.chains(); `crowded`: they have more sharp tiles than `table` has slots; `coarse`: see measure_losses().
+[[nodiscard]] ViewDemand demand_of(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded,
+                                   const atlas::Layout& layout, const PageTable& table, const ImageLookup& images,
+                                   const CoarseLuma* coarse, const AllocationOptions& options);
 
 /// Sets `demand.lit`; true if every tile of the target has a picture.
 bool note_lit(ViewDemand& demand, const ImageLookup& images);

@@ -1,6 +1,6 @@
 #include "actors/tile_scheduler/wanted_tiles.hpp"
 
-#include <algorithm>
+#include "actors/tile_scheduler/falling_weight.hpp"
 
 namespace darm::tile_scheduler {
 namespace {
@@ -54,10 +54,7 @@ const std::vector<TileId>& WantedTiles::list(std::size_t slots) {
   order.reserve(wanted_);
   for (std::uint32_t i = 0; i < shares_.size(); ++i)
     if (shares_[i].views > 0) order.push_back(i);
-  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
-    return shares_[a].weight != shares_[b].weight ? shares_[a].weight > shares_[b].weight
-                                                  : index_.keys()[a] < index_.keys()[b];
-  });
+  sort_by_falling_weight(order, index_.keys(), [&](std::uint32_t i) { return shares_[i].weight; });
   if (order.size() > slots) order.resize(slots);
   list_.clear();
   for (const auto number : order) list_.push_back(index_.keys()[number]);

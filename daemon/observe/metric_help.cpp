@@ -55,7 +55,7 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_store_torn_tiles", "Tiles dropped at start because they were written in part"},
     {"darm_stream_joins_total", "Sessions that came to a stream of others"},
     {"darm_stream_sessions", "Sessions on a shared stream, once a stream and update"},
-    {"darm_stream_splits_total", "Sessions that left a stream of others for one of their own"},
+    {"darm_stream_splits_total", "Sessions taken from a stream that they no longer fitted"},
     {"darm_streams", "Shared streams"},
     {"darm_view_allocation_seconds", "Time to choose what a private layer's slots hold"},
     {"darm_view_bytes_total", "Bytes of H.264 of private layers"},

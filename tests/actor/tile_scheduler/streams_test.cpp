@@ -23,6 +23,13 @@ class SharedStreams : public TileScheduler {
     for (const auto stream : heard_.encoders)
       if (!heard_.frames[stream].empty()) finish_frame(stream);
   }
+  void both_look_ahead() {
+    open(ann_);
+    open(bob_);
+    look(ann_, 1, ahead_);
+    look(bob_, 1, ahead_);
+    run(10);
+  }
   std::size_t keys(StreamId stream) {
     const auto& frames = heard_.frames[stream];
     return static_cast<std::size_t>(std::count_if(frames.begin(), frames.end(), [](const auto& f) { return f.key; }));
@@ -157,11 +164,7 @@ TEST_F(SharedStreams, ManyWhoComeAtOnceShareKeyFrames) {
 }
 
 TEST_F(SharedStreams, MembersForceTwoKeyFramesASecondBetweenThem) {
-  open(ann_);
-  open(bob_);
-  look(ann_, 1, ahead_);
-  look(bob_, 1, ahead_);
-  run(10);
+  both_look_ahead();
   const auto before = keys(first_);
   for (int i = 0; i < 20; ++i) {  // 2 s
     scheduler_.tell(KeyFrameWanted(i % 2 == 0 ? ann_ : bob_));
@@ -173,11 +176,7 @@ TEST_F(SharedStreams, MembersForceTwoKeyFramesASecondBetweenThem) {
 }
 
 TEST_F(SharedStreams, AStreamEndsWithItsLastMemberNotBefore) {
-  open(ann_);
-  open(bob_);
-  look(ann_, 1, ahead_);
-  look(bob_, 1, ahead_);
-  run(10);
+  both_look_ahead();
   scheduler_.tell(SessionClosed(ann_));
   system_.run_until_idle();
   EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{bob_});
@@ -245,11 +244,7 @@ TEST_F(CrowdedStreams, WhatDoesNotFitIsSharedOutAndAnsweredMeanwhile) {
 }
 
 TEST_F(SharedStreams, AnEncoderThatIsGoneIsReplacedAndAllGetAKeyFrame) {
-  open(ann_);
-  open(bob_);
-  look(ann_, 1, ahead_);
-  look(bob_, 1, ahead_);
-  run(10);
+  both_look_ahead();
   scheduler_.tell(KeyFrameWanted(bob_));
   system_.run_until_idle();
   const auto before = keys(first_);

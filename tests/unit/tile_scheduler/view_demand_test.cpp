@@ -24,8 +24,10 @@ class Demand : public ::testing::Test {
       set_.add(one, 1);
     }
   }
-  [[nodiscard]] ViewDemand demand(std::size_t slots) const {
-    return demand_of(set_, *world_.layout, PageTable(slots), [this](TileId t) { return find(t); }, nullptr, {});
+  [[nodiscard]] ViewDemand demand(std::size_t slots, const CoarseLuma* coarse = nullptr) const {
+    const bool crowded = sharp_tiles(set_.chains()).size() > slots;
+    const auto images = [this](TileId t) { return find(t); };
+    return demand_of(set_, set_.chains(), crowded, *world_.layout, PageTable(slots), images, coarse, {});
   }
   [[nodiscard]] const StoredImage* find(TileId tile) const {
     const auto it = images_.find(tile);
@@ -85,8 +87,7 @@ TEST_F(Demand, CoarseTexelsUnderTheViewAreAskedForUntilThereIsACoarsePicture) {
       EXPECT_TRUE(tiles.contains(tile.index())) << tile.index();
     }
   const CoarseLuma luma{2, 2, std::vector<std::uint8_t>(4)};
-  EXPECT_TRUE(
-      demand_of(set_, *world_.layout, PageTable(64), [this](TileId t) { return find(t); }, &luma, {}).coarse.empty());
+  EXPECT_TRUE(demand(64, &luma).coarse.empty());
 }
 
 TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
