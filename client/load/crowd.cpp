@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "client/load/split_mix.hpp"
+
 namespace darm::client::load {
 namespace {
 
@@ -33,12 +35,9 @@ std::string_view to_string(Role role) {
   return kNames[static_cast<std::size_t>(role)];
 }
 
-// SplitMix64 (Steele, Lea and Flood 2014), the upper 53 bits.
 double chance(std::uint64_t seed, std::uint64_t what) {
-  std::uint64_t x = seed * 0x9e3779b97f4a7c15u + what * 0xd1342543de82ef95u + 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53;
+  const std::uint64_t x = seed * 0x9e3779b97f4a7c15u + what * 0xd1342543de82ef95u + 0x9e3779b97f4a7c15u;
+  return static_cast<double>(split_mix(x) >> 11) * 0x1p-53;
 }
 
 Result<std::vector<ClientPlan>> plan_crowd(const CrowdShape& shape) {
@@ -46,6 +45,10 @@ Result<std::vector<ClientPlan>> plan_crowd(const CrowdShape& shape) {
   if (needed > shape.clients) {
     return fail(fmt::format("--clients {}: --draw, --decode, --slow, --vanish and --teleport together name {}",
                             shape.clients, needed));
+  }
+  if (shape.churn > 0 && needed == shape.clients) {
+    return fail(fmt::format("--churn {}: only clients that neither decode nor misbehave leave, and of {} there is none",
+                            shape.churn, shape.clients));
   }
   std::vector<ClientPlan> crowd(shape.clients);
   for (std::uint32_t i = 0; i < shape.clients; ++i) {

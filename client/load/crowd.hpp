@@ -25,6 +25,7 @@ struct CrowdShape {
   std::uint32_t decode = 0;  ///< decode; the others look at bytes alone
   std::uint32_t slow = 0, vanish = 0, teleport = 0;
   std::uint32_t places = 1;  ///< groups, at least 1
+  double churn = 0;          ///< healthy clients that do not decode leave, and others come, so many a second
   double spread = 0.5;       ///< metres
   std::uint64_t seed = 1;
 };
@@ -41,7 +42,8 @@ struct ClientPlan {
 };
 
 /// Those that draw and decode come first and are healthy, the ill-behaved last; groups take turns, so that each has its
-/// share of every kind. Positions lie within a flat ellipsoid of radius `spread`. Error: more roles than clients.
+/// share of every kind. Positions lie within a flat ellipsoid of radius `spread`. Error: more roles than clients,
+/// or nobody to leave though some should.
 [[nodiscard]] Result<std::vector<ClientPlan>> plan_crowd(const CrowdShape& shape);
 
 /// A number of [0, 1) for `seed` and `what`, always the same.

@@ -243,10 +243,11 @@ void Run::vanish_due(std::int64_t now) {
   }
 }
 
-// Healthy clients that do not decode leave in turn, and somebody else takes their place.
+// Healthy clients that do not decode leave in turn (plan_crowd() has seen to it that there are some), and somebody else
+// takes their place.
 void Run::churn_due(std::int64_t now) {
   const double until = std::min(seconds(now - counting_since_), plan_.seconds - kLastJoin);
-  const auto due = static_cast<std::uint64_t>(std::max(until, 0.0) * plan_.churn);
+  const auto due = static_cast<std::uint64_t>(std::max(until, 0.0) * plan_.crowd.churn);
   for (; churned_ < due; ++churned_) {
     for (std::size_t tries = 0; tries < slots_.size(); ++tries) {
       const std::uint32_t i = next_leaver_++ % static_cast<std::uint32_t>(slots_.size());

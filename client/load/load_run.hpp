@@ -27,7 +27,6 @@ struct LoadPlan {
   double warm_up = 60;              ///< counting begins after so long, though not all clients are ready
   double settle = 0;                ///< seconds the server is watched after all have left
   double connects_per_second = 20;  ///< at the start
-  double churn = 0;                 ///< joins, and as many leaves, a second while it is counted
   int server_pid = 0;               ///< 0: its processor time and memory are not known
 };
 

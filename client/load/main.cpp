@@ -91,7 +91,7 @@ void declare_crowd(CLI::App& app, LoadPlan& plan) {
       ->check(CLI::Range(0u, kMostClients));
   app.add_option("--teleport", crowd.teleport, "of these, look from somewhere else every second")
       ->check(CLI::Range(0u, kMostClients));
-  app.add_option("--churn", plan.churn, "joins a second, and as many leaves")->check(number_option(0, 1000));
+  app.add_option("--churn", plan.crowd.churn, "joins a second, and as many leaves")->check(number_option(0, 1000));
   app.add_option("--spread", crowd.spread, "metres around its group's place in which each client is")
       ->capture_default_str()
       ->check(number_option(0, 1e6));

@@ -6,6 +6,7 @@
 
 #include "client/core/page_table.hpp"
 #include "client/load/nal_units.hpp"
+#include "client/load/split_mix.hpp"
 
 namespace darm::client::load {
 namespace {
@@ -13,15 +14,10 @@ namespace {
 constexpr std::uint32_t kNobody = 0xffffffffu;
 constexpr std::uint64_t kMostDropped = 1u << 20;
 
-// Finaliser of SplitMix64 (Steele, Lea and Flood 2014): the sum over all residents tells tables apart.
-std::uint64_t mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
+// The sum over all residents tells tables apart.
+std::uint64_t mark(std::uint32_t entry, std::uint16_t slot) {
+  return split_mix((std::uint64_t{entry} << 16 | slot) + 0x9e3779b97f4a7c15u);
 }
-
-std::uint64_t mark(std::uint32_t entry, std::uint16_t slot) { return mix(std::uint64_t{entry} << 16 | slot); }
 
 }  // namespace
 

@@ -44,6 +44,17 @@ TEST(Crowd, MoreRolesThanClientsAreRefused) {
   EXPECT_FALSE(plan_crowd(shape).has_value());
 }
 
+TEST(Crowd, ChurnNeedsSomebodyWhoMayLeave) {
+  CrowdShape shape;
+  shape.clients = 4;
+  shape.decode = 2;
+  shape.slow = 2;
+  shape.churn = 1;
+  EXPECT_FALSE(plan_crowd(shape).has_value());
+  shape.clients = 5;
+  EXPECT_TRUE(plan_crowd(shape).has_value());
+}
+
 TEST(Crowd, SpreadIsBoundedAndRepeatable) {
   CrowdShape shape;
   shape.clients = 1000;
