@@ -30,14 +30,16 @@ constexpr std::uintmax_t kMaxFileBytes = 16u << 20;
 constexpr std::size_t kMaxKeys = 100000;
 
 constexpr double kFarthest = 1e7;  // metres, as darmd has it
-constexpr const char* kBounds = "position and target must be finite and within 1e7, the field of view 0.1 to 179";
+constexpr const char* kBounds =
+    "position and target must be finite, within 1e7 and apart, the field of view 0.1 to 179";
 
 bool near(const glm::dvec3& v) {  // false for NaN
   return std::abs(v.x) <= kFarthest && std::abs(v.y) <= kFarthest && std::abs(v.z) <= kFarthest;
 }
 
 bool valid(const CameraKey& k) {
-  return std::isfinite(k.t) && near(k.position) && near(k.target) && k.fovy >= 0.1 && k.fovy <= 179;
+  return std::isfinite(k.t) && near(k.position) && near(k.target) && k.position != k.target && k.fovy >= 0.1 &&
+         k.fovy <= 179;
 }
 
 // A number as it is written, be it of use or not: nan, inf, and infinity for what no double holds.

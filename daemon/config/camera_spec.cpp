@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace darm::config {
@@ -43,6 +45,17 @@ std::optional<glm::dvec3> point(std::string_view text) {
   return result;
 }
 
+// What may be written; set-ups like to name cameras as their scene does.
+std::string names_of(std::span<const Pose> poses, std::span<const scene::NamedCamera> scene_cameras) {
+  std::vector<std::string> names;
+  const auto add = [&](const std::string& name) {
+    if (!name.empty() && std::ranges::find(names, name) == names.end()) names.push_back(name);
+  };
+  for (const auto& pose : poses) add(pose.name);
+  for (const auto& camera : scene_cameras) add(camera.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 }  // namespace
 
 Camera camera_of(const Pose& pose) { return look_at(pose.position, pose.target, pose.fovy_degrees); }
@@ -56,9 +69,7 @@ Result<Camera> parse_camera_spec(std::string_view spec, std::span<const Pose> po
 
   const auto parts = split(spec, ' ');
   if (parts.size() < 2 || parts.size() > 3 || spec.find(',') == std::string_view::npos) {
-    std::string names;
-    for (const auto& pose : poses) names += (names.empty() ? "" : ", ") + pose.name;
-    for (const auto& camera : scene_cameras) names += (names.empty() ? "" : ", ") + camera.name;
+    const auto names = names_of(poses, scene_cameras);
     return fail(fmt::format("camera \"{}\": no such name{}; write one of them or {}", spec.substr(0, 100),
                             names.empty() ? " (the set-up names none)" : " among " + names, kForm));
   }
@@ -68,6 +79,7 @@ Result<Camera> parse_camera_spec(std::string_view spec, std::span<const Pose> po
   const auto target = point(parts[1]);
   if (!target)
     return fail(fmt::format("camera target \"{}\": not three numbers within 1e7; write {}", parts[1], kForm));
+  if (*position == *target) return fail(fmt::format("camera \"{}\": it looks at where it stands", spec));
   double fovy = 60;
   if (parts.size() == 3) {
     const auto given = number(parts[2], 1, 179);

@@ -54,6 +54,7 @@ void read_pose(TableReader& reader, Pose& pose, bool named) {
   reader.vector3("target", pose.target, -kMaxCoordinate, kMaxCoordinate);
   reader.number("fovy", pose.fovy_degrees, 1, 179);
   reader.require({"position", "target"});
+  if (pose.position == pose.target) reader.fault("target", "is the position: the camera looks at where it stands");
   if (named) reader.require({"name"});
 }
 

@@ -93,6 +93,7 @@ Result<Walkthrough> Walkthrough::make(std::vector<PathPose> poses) {
     if (i > 0 && p.t - poses[i - 1].t < 1e-6) return bad("t is not after that of the entry before");
     if (!in_range(p.position)) return bad("position is not within 1e7 of the origin");
     if (!in_range(p.target)) return bad("target is not within 1e7 of the origin");
+    if (p.position == p.target) return bad("target is the position");
     if (!(p.fovy_degrees >= 1 && p.fovy_degrees <= 179)) return bad("fovy is not in 1..179 degrees");
   }
   return Walkthrough(std::move(poses));

@@ -35,9 +35,17 @@ TEST(CameraSpecTest, UnknownNameListsTheKnownOnes) {
   EXPECT_NE(camera.error().message.find("door, cam"), std::string::npos) << camera.error().message;
 }
 
+TEST(CameraSpecTest, NamesThatSetUpAndSceneShareAreListedOnce) {
+  const auto camera = parse_camera_spec("dor", kPoses, kScene);
+  ASSERT_FALSE(camera);
+  const auto& message = camera.error().message;
+  EXPECT_EQ(message.find(kPoses[0].name), message.rfind(kPoses[0].name)) << message;
+}
+
 TEST(CameraSpecTest, BadNumbersAreErrors) {
-  for (const char* spec : {"", "1,2,3", "1,2 3,4,5 60", "1,2,x 3,4,5 60", "1,2,3 4,5,6 0", "1,2,3 4,5,6 nan",
-                           "inf,2,3 4,5,6 60", "1,2,3 4,5,6 60 7", "1e9,2,3 4,5,6 60", "1,2,3, 4,5,6 60"})
+  for (const char* spec :
+       {"", "1,2,3", "1,2 3,4,5 60", "1,2,x 3,4,5 60", "1,2,3 4,5,6 0", "1,2,3 4,5,6 nan", "inf,2,3 4,5,6 60",
+        "1,2,3 4,5,6 60 7", "1e9,2,3 4,5,6 60", "1,2,3, 4,5,6 60", "1,2,3 1,2,3 60"})
     EXPECT_FALSE(parse_camera_spec(spec, {}, {})) << spec;
 }
 
