@@ -5,7 +5,7 @@ from pathlib import Path
 
 from running import Daemon, Folder, start_probe
 
-PATIENCE = 90
+PATIENCE = 120
 
 
 def samples(daemon):
@@ -17,7 +17,7 @@ class Target(unittest.TestCase):
         with Folder() as folder:
             set_up = Path(folder) / "target.toml"
             set_up.write_text("[accuracy]\ntarget = 1\n")
-            daemon = Daemon(Path(folder) / "state", "--config", set_up)
+            daemon = Daemon(Path(folder) / "state", "--config", set_up, q=32)
             client = start_probe(daemon.tcp, "hall", Path(folder) / "picture.png", PATIENCE + 10, "--view-phystex",
                                  "0")
             try:
