@@ -3,7 +3,7 @@ import json
 import subprocess
 import unittest
 
-from running import BIN, SET_UP, SOURCE, WithDaemon
+from running import BIN, SET_UP, SOURCE, Daemon, WithDaemon
 
 WALK = SOURCE / "config/walkthroughs/default.json"
 KEYS = ("clients connected updates_per_second stream_frames_per_second no_changes_per_second integrity_faults "
