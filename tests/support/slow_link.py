@@ -44,8 +44,10 @@ class SlowLink:
         self.started.set()
         self.loop.run_forever()
         server.close()
-        for task in asyncio.all_tasks(self.loop):
+        tasks = asyncio.all_tasks(self.loop)
+        for task in tasks:
             task.cancel()
+        self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
         self.loop.run_until_complete(asyncio.sleep(0))
         self.loop.close()
 
@@ -58,7 +60,13 @@ class SlowLink:
         except OSError:
             near_out.close()
             return
-        await asyncio.gather(self._carry(near_in, far_out), self._carry(far_in, near_out))
+        try:
+            await asyncio.gather(self._carry(near_in, far_out), self._carry(far_in, near_out))
+        except asyncio.CancelledError:
+            pass
+        finally:
+            for end in (near_out, far_out):  # both hear of it: a server that does not keeps a ghost for its time-out
+                end.transport.abort()
 
     async def _carry(self, source, sink):
         pieces = asyncio.Queue()
