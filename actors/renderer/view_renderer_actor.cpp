@@ -7,6 +7,11 @@
 #include <utility>
 
 namespace darm::renderer {
+namespace {
+
+constexpr std::size_t kViewsPerBatch = 8;  // choosing among the tiles of a view takes as long as shading some
+
+}  // namespace
 
 struct ViewRendererActor::Job {
   SessionId session{};
@@ -117,9 +122,18 @@ void ViewRendererActor::begin_batch() {
   take_wishes();
   if (views_.empty()) return;
   auto batch = std::make_shared<Batch>();
-  const double budget = double{parts_->options.batch_ms} * 1000.0 * executor().workers() / sample_us_ /
-                        static_cast<double>(views_.size());
-  for (auto& [session, view] : views_) add_jobs(session, view, budget, *batch);
+  const auto most = std::min(views_.size(), kViewsPerBatch);
+  const double budget =
+      double{parts_->options.batch_ms} * 1000.0 * executor().workers() / sample_us_ / static_cast<double>(most);
+  std::size_t served = 0;
+  auto next = views_.upper_bound(last_view_);
+  for (std::size_t looked_at = 0; looked_at < views_.size() && served < most; ++looked_at, ++next) {
+    if (next == views_.end()) next = views_.begin();
+    last_view_ = next->first;
+    const auto before = batch->jobs.size();
+    add_jobs(next->first, next->second, budget, *batch);
+    served += batch->jobs.size() > before ? 1 : 0;
+  }
   if (!batch->jobs.empty()) post(batch);
 }
 

@@ -32,7 +32,7 @@ struct ViewRendererParts {
 };
 
 /// Works batch by batch: each tile has one writer, and between batches the newest ShadeView of each session takes hold.
-/// Sessions share a batch evenly. Without sessions it does nothing at all.
+/// Sessions share a batch evenly; where there are many, they take turns. Without sessions it does nothing at all.
 class ViewRendererActor : public runtime::Actor<ViewInbox> {
  public:
   ViewRendererActor(runtime::Context<ViewInbox> context, ViewRendererParts parts);
@@ -71,6 +71,7 @@ class ViewRendererActor : public runtime::Actor<ViewInbox> {
   std::shared_ptr<const StoredLight> stored_;
   std::shared_ptr<Batch> batch_;  // null: idle
   std::uint64_t batch_number_ = 0;
+  SessionId last_view_{};  // whose turn it was last
   std::size_t slices_left_ = 0;
   std::size_t tiles_held_ = 0;
   std::uint32_t picture_number_ = 0;

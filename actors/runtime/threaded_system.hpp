@@ -13,7 +13,7 @@ namespace darm::runtime {
 struct ThreadedOptions {
   unsigned workers = 0;           ///< pool threads; 0: one per core that this process may use
   unsigned actor_threads = 2;     ///< threads for actor turns, apart from the pool: a handler never waits for a slice
-  int worker_nice = 5;            ///< added to the niceness of pool threads, 0..19, so that actors and sockets go first
+  int worker_nice = 10;           ///< added to the niceness of pool threads, 0..19, so that actors and sockets go first
   MetricSink* metrics = nullptr;  ///< must outlive the system; null: none
 };
 

@@ -8,11 +8,12 @@ namespace {
 
 constexpr double kLearned = 0.1;     // weight of the newest frame
 constexpr double kMostUs = 200'000;  // a frame that took longer was held up by something else
-constexpr double kLongestUs = 2e6;   // a stream is never silent for longer
 
 }  // namespace
 
-FramePace::FramePace(double processors) : processors_(std::isfinite(processors) ? std::max(processors, 1e-3) : 1.0) {}
+FramePace::FramePace(double processors, Microseconds longest)
+    : processors_(std::isfinite(processors) ? std::max(processors, 1e-3) : 1.0),
+      longest_us_(static_cast<double>(longest)) {}
 
 void FramePace::done(Microseconds busy) {
   if (busy <= 0) return;
@@ -22,7 +23,7 @@ void FramePace::done(Microseconds busy) {
 Microseconds FramePace::interval(std::size_t streams, bool moving) const {
   if (streams <= 1) return 0;
   const double each = frame_us_ * static_cast<double>(streams) / processors_;
-  return static_cast<Microseconds>(std::min(moving ? each / 2 : each, kLongestUs));
+  return static_cast<Microseconds>(std::min(moving ? each / 2 : each, longest_us_));
 }
 
 }  // namespace darm::tile_scheduler

@@ -12,8 +12,9 @@ namespace darm::tile_scheduler {
 /// what it lacks is new, not finer.
 class FramePace {
  public:
-  /// `processors`: processor time that coding may take in a second of wall time, more than 0.
-  explicit FramePace(double processors);
+  /// `processors`: processor time that coding may take in a second of wall time, more than 0. `longest`: no stream is
+  /// silent for longer.
+  explicit FramePace(double processors, Microseconds longest = 2'000'000);
 
   /// A frame took so much processor time. 0 or less: nothing is learned.
   void done(Microseconds busy);
@@ -22,6 +23,7 @@ class FramePace {
 
  private:
   double processors_;
+  double longest_us_;
   double frame_us_ = 30'000;  // what a frame is expected to take
 };
 

@@ -122,8 +122,8 @@ void PrivateLayer::put(const std::vector<ShadedTile>& tiles) {
   if (new_one) grant();
 }
 
-StreamStep PrivateLayer::step(Microseconds now) {
-  return stream_.step(granted_, [this](TileId tile) { return images_.find(tile); }, 0.0f, now);
+StreamStep PrivateLayer::step(Microseconds now, Microseconds least_interval) {
+  return stream_.step(granted_, [this](TileId tile) { return images_.find(tile); }, 0.0f, now, least_interval);
 }
 
 }  // namespace darm::tile_scheduler

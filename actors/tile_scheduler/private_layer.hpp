@@ -42,7 +42,7 @@ class PrivateLayer {
   [[nodiscard]] bool idle() const { return stream_.last_frame() == 0 && granted_.empty(); }
   [[nodiscard]] StreamState& stream() { return stream_; }
   [[nodiscard]] const StreamState& stream() const { return stream_; }
-  [[nodiscard]] StreamStep step(Microseconds now);
+  [[nodiscard]] StreamStep step(Microseconds now, Microseconds least_interval = 0);
   [[nodiscard]] std::size_t target_size() const { return target_.tiles.size(); }
 
  private:

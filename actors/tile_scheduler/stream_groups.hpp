@@ -21,13 +21,13 @@ struct GroupLimit {
 };
 
 struct GroupOptions {
-  bool share = true;                    ///< false: every session has a stream of its own
-  GroupLimit join{0.85, 1.05};          ///< to join, the union must fit with room,
-  GroupLimit part{0.95, 1.12};          ///< what is split has some room again,
-  GroupLimit stay{1.0, 1.2};            ///< and what is together stays so up to this
-  Microseconds join_after = 2'000'000;  ///< streams join when they would have fitted for so long
-  Microseconds split_after = 500'000;   ///< and split when they have not fitted for so long
-  Microseconds plan_every = 250'000;    ///< how often joins are looked for
+  bool share = true;                     ///< false: every session has a stream of its own
+  GroupLimit join{0.85, 1.05};           ///< to join, the union must fit with room,
+  GroupLimit part{0.95, 1.12};           ///< what is split has some room again,
+  GroupLimit stay{1.0, 1.2};             ///< and what is together stays so up to this
+  Microseconds join_after = 4'000'000;   ///< streams join when they would have fitted for so long
+  Microseconds split_after = 1'000'000;  ///< and split when they have not fitted for so long
+  Microseconds plan_every = 250'000;     ///< how often joins are looked for
 };
 
 /// A session goes to another stream.

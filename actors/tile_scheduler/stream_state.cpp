@@ -44,12 +44,26 @@ bool StreamState::has_news(std::span<const TileId> wanted, const ImageLookup& im
   });
 }
 
+bool StreamState::answers_in_flight(SessionId session) const {
+  return std::ranges::any_of(answers_in_flight_, [&](const ViewAnswer& a) { return a.session == session; });
+}
+
+std::vector<ViewAnswer> StreamState::take_answers() {
+  std::vector<ViewAnswer> out;
+  for (auto& [session, answer] : answers_) out.push_back(answer);
+  answers_.clear();
+  return out;
+}
+
 StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& images, float error, Microseconds now,
                              Microseconds least_interval) {
   StreamStep out;
   if (in_flight()) return out;
   wanted = wanted.first(std::min(wanted.size(), table_.capacity()));
-  if (!key_pending_ && now - sent_at_ < least_interval && has_news(wanted, images, now)) return out;
+  if (!key_pending_ && now - sent_at_ < least_interval && has_news(wanted, images, now)) {
+    out.no_change = take_answers();
+    return out;
+  }
   encoder::ComposeFrame frame(last_frame_ + 1, key_pending_);
   table_.begin_frame(frame.frame, wanted);
   enter_new(frame, wanted, images);
@@ -60,9 +74,7 @@ StreamStep StreamState::step(std::span<const TileId> wanted, const ImageLookup& 
   for (const auto& edit : key_pending_ ? table_.whole() : table_.take_edits()) frame.edits.push_back(edit_of(edit));
   if (key_pending_) static_cast<void>(table_.take_edits());
 
-  std::vector<ViewAnswer> answers;
-  for (auto& [session, answer] : answers_) answers.push_back(answer);
-  answers_.clear();
+  auto answers = take_answers();
   if (!frame.key && frame.writes.empty() && frame.edits.empty() && !polish_due(now)) {
     out.no_change = std::move(answers);
     return out;

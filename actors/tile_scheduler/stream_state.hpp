@@ -45,7 +45,7 @@ struct StreamOptions {
 /// What to do now for a stream.
 struct StreamStep {
   std::optional<encoder::ComposeFrame> frame;  ///< to the encoder
-  std::vector<ViewAnswer> no_change;           ///< to these sessions: looked at, nothing to send
+  std::vector<ViewAnswer> no_change;           ///< to these sessions: looked at, nothing to send now
 };
 
 class StreamState {
@@ -59,9 +59,8 @@ class StreamState {
   std::optional<ViewAnswer> forget_session(SessionId session);
 
   /// Decides on the next frame. `wanted`: tiles the sessions should have, most important first, at most as many as
-  /// slots; only those with an image enter. Nothing happens while a frame is in flight. `least_interval` after the last
-  /// frame, what would make another one waits with its answers, but for a key frame; without anything to send cameras
-  /// are answered as ever.
+  /// slots; only those with an image enter. Nothing happens while a frame is in flight. Until `least_interval` after
+  /// the last frame there is none but a key frame; cameras are answered without.
   [[nodiscard]] StreamStep step(std::span<const TileId> wanted, const ImageLookup& images, float error,
                                 Microseconds now, Microseconds least_interval = 0);
   /// The encoder is done with frame `number`. A failed frame makes the next one a key frame and is answered again. Not
@@ -74,11 +73,14 @@ class StreamState {
   [[nodiscard]] bool in_flight() const { return in_flight_ != 0; }
   /// The next frame is a key frame.
   [[nodiscard]] bool key_pending() const { return key_pending_; }
+  /// The frame in flight answers a camera of this session.
+  [[nodiscard]] bool answers_in_flight(SessionId session) const;
   [[nodiscard]] bool has_answers() const { return !answers_.empty(); }
   [[nodiscard]] FrameNumber last_frame() const { return last_frame_; }
 
  private:
   [[nodiscard]] bool has_news(std::span<const TileId> wanted, const ImageLookup& images, Microseconds now) const;
+  [[nodiscard]] std::vector<ViewAnswer> take_answers();
   [[nodiscard]] bool polish_due(Microseconds now) const;
   [[nodiscard]] bool refine_due(Microseconds now) const { return now - sent_at_ >= options_.refine_interval; }
   void write_slot(encoder::ComposeFrame& frame, SlotIndex slot, const StoredImage& image);

@@ -1,6 +1,6 @@
 // The tile scheduler: what each session sees -> what is shaded, who shares a stream, what a stream holds, when its
-// frames go out. Handlers are in tile_scheduler_actor.cpp, streams in tile_scheduler_streams.cpp, private layers in
-// tile_scheduler_views.cpp.
+// frames go out. Handlers are in tile_scheduler_actor.cpp, looks in tile_scheduler_looks.cpp, streams in
+// tile_scheduler_streams.cpp, private layers in tile_scheduler_views.cpp.
 #pragma once
 
 #include <functional>
@@ -19,13 +19,13 @@
 #include "actors/tile_scheduler/frame_pace.hpp"
 #include "actors/tile_scheduler/image_store.hpp"
 #include "actors/tile_scheduler/private_layer.hpp"
-#include "actors/tile_scheduler/stream_demand.hpp"
+#include "actors/tile_scheduler/shared_set.hpp"
 #include "actors/tile_scheduler/stream_groups.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
 #include "actors/tile_scheduler/trace_budget.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
-#include "actors/tile_scheduler/wanted_tiles.hpp"
+#include "actors/tile_scheduler/working_set.hpp"
 
 namespace darm::tile_scheduler {
 
@@ -39,7 +39,16 @@ struct SchedulerOptions {
   /// Share of the pool's time that tracing visibility may take before passes of still views wait; those under
   /// `passes_unlit` never do.
   double looking = 0.15;
-  double coding = 0.25;  ///< and that composing and encoding shared streams may take, views that move apart
+  /// Of a stream of more members than this, each looks less often while it moves, down to once in `crowd_updates`: they
+  /// see much the same, and what they see is shared.
+  std::size_t crowd = 4;
+  std::size_t crowd_updates = 5;
+  double crowd_rays = 24'000;  ///< a second, for all of them together
+  double near = 0.02;          ///< but a camera that has moved by this share of the scene's diagonal,
+  double near_angle = 0.2;     ///< or turned by so many radians since its last look, is looked at
+  double glancing = 0.15;      ///< and that of views that move: where there are many, each look has fewer rays
+  double coding = 0.25;        ///< and that composing and encoding shared streams may take, views that move apart
+  double coding_views = 0.05;  ///< and private layers
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
   /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.
   Microseconds reweigh_interval = 1'000'000;
@@ -52,7 +61,13 @@ struct SchedulerOptions {
   GroupOptions groups;
   /// Streams are shared by the tiles that make up so much of each view; coarser levels do for the rest.
   double significant = 0.98;
-  double weighing = 0.5;  ///< of one processor: what choosing tiles for several crowded views at once may take
+  /// A look of one of many that shows less than this share of what its stream's tiles were chosen for is answered when
+  /// they have been chosen again.
+  float known = 0.9f;
+  double weighing = 0.3;        ///< of one processor: what choosing tiles may take where there are several clients,
+  double weighing_views = 0.1;  ///< and choosing private ones
+  /// Least time between private layers that are chosen anew, where there are several: each makes light for one eye.
+  Microseconds view_interval = 80'000;
   WorkingSetOptions working_set;
   AllocationOptions allocation;
   StreamOptions stream;
@@ -105,22 +120,22 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     std::optional<Microseconds> error_at;
     Stream* stream = nullptr;  // from its first look on
     bool awaits_key = false;   // it came to the stream after that's last key frame
+    bool unchosen = false;     // it sees what the stream's tiles have not been chosen for yet
     WorkingSet set;
-    std::vector<TileId> sharp;         // of the set, as the stream's tally has them
-    ViewDemand demand;                 // as slots were chosen last
-    bool granted_new = true;           // demand.granted has changed since the stream's list was told
-    Allocation wanted;                 // what the list holds of it
-    std::optional<ViewDemand> seen;    // newer; slots have not been chosen for it yet
+    Microseconds grouped_at = 0;       // when groups_ heard of its set
+    bool ungrouped = false;            // which has changed since then
     std::optional<ViewAnswer> answer;  // due with the stream's next frame
     std::optional<ViewChanged> view;   // newest camera
     std::optional<ViewChanged> posed;  // the camera of the working set's pose
     CameraSequence taken_up = 0;       // newest sequence that a trace or an answer includes
     std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
+    std::optional<Microseconds> moved_at;  // its newest camera, looked at or not, was another than the one before
     int updates_waited = 0;
-    Microseconds weighed_at = 0;             // of demand.target
-    bool pictures_since = false;             // some came after that
     std::optional<PrivateLayer> view_layer;  // what depends on its eye
+    std::optional<ViewChanged> view_posed;   // the camera of what the layer holds
+    Microseconds view_weighed_at = 0;        // when its tiles were chosen
+    bool view_unweighed = false;             // it has seen more since then
     StreamId view_stream_id{};
     runtime::Ref<encoder::Inbox> view_encoder;  // made with its first frame
     std::optional<Microseconds> view_key_forced_at;
@@ -138,19 +153,21 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     StreamFormat format;
     runtime::Ref<encoder::Inbox> encoder;
     StreamState state;
-    std::vector<Session*> members;    // by id
-    TileTally sharp;                  // of all members
-    WantedTiles wanted;               // of all members, while there are several
-    JointView joint;                  // of members whose slots were chosen together
-    Microseconds allocate_after = 0;  // the next time that is done, at the earliest
-    bool ungranted = false;           // pictures have come since then
-    Microseconds asked_at = 0;        // for the first pictures
+    std::vector<Session*> members;  // by id
+    SharedSet together;             // what they see, while there are several
+    ViewDemand demand;              // as slots were chosen last
+    ChainIndex known;               // numbers of its chains, while there are several members
+    Microseconds weighed_at = 0;    // when that was
+    Microseconds choose_after = 0;  // the next time they are chosen, at the earliest
+    bool unchosen = false;          // there is more to see
+    bool ungranted = false;         // pictures have come since then
+    bool pictures_since = false;    // and since slots were chosen
+    Microseconds asked_at = 0;      // for the first pictures
     std::optional<Microseconds> key_at;
     std::optional<Microseconds> key_forced_at;
     bool key_put_off = false;  // asked for again too soon after that
     Stream(StreamId number, const StreamFormat& f, const StreamOptions& o) : id(number), format(f), state(f, o) {}
-    // Several views that do not all fit: slots are chosen for all of them at once.
-    [[nodiscard]] bool crowded() const { return members.size() > 1 && sharp.distinct() > state.table().capacity(); }
+    [[nodiscard]] bool shared() const { return members.size() > 1; }
   };
 
   [[nodiscard]] ImageLookup images() const;
@@ -158,16 +175,24 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void schedule_tick();
   [[nodiscard]] std::vector<Session*> by_last_look();
   void update(Session& session);
-  bool look_with_another(Session& session);
-  void start_view(Session& session);
-  [[nodiscard]] int passes_due(Session& session, bool moved);
-  void post_slices(const std::shared_ptr<ViewJob>& job);
-  void finish_view(Session& session);
-  void know_view(Session& session, ViewAnswer answer);
-  void reallocate(Session& session);
   void send_work();
   void send_work_soon();
   void record_errors();
+
+  // Looks.
+  void start_view(Session& session);
+  bool look_with_another(Session& session);
+  [[nodiscard]] int passes_due(Session& session, bool moved);
+  [[nodiscard]] std::uint32_t rays_due(const Session& session, bool moved);
+  [[nodiscard]] std::uint32_t enough_rays(const Session& session, Microseconds interval) const;
+  [[nodiscard]] Microseconds look_interval(const Session& session) const;
+  [[nodiscard]] bool seen_by_others(const Session& session) const;
+  void answer_without_look(Session& session);
+  [[nodiscard]] std::shared_ptr<ViewJob> make_job(Session& session, bool moved, int done, int count);
+  void post_slices(const std::shared_ptr<ViewJob>& job);
+  void finish_view(Session& session);
+  void know_view(Session& session, ViewAnswer answer);
+  void count_moving();
 
   // Streams.
   void place(Session& session);
@@ -175,15 +200,19 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void leave(Session& session);
   void regroup();
   void settle(Stream& stream);
-  void choose_alone(Session& session, std::vector<WeightedChain> chains);
-  void choose_together(Stream& stream);
+  void group(Session& session);
+  void gather(Stream& stream);
+  void note_seen(Session& session);
+  void choose_if_due(Stream& stream);
+  void choose(Stream& stream);
+  void set_targets(Stream& stream) const;
   void grant(Stream& stream);
-  void note_weighed(Session& session);
   void note_chosen(Stream& stream, Microseconds started);
   void force_key(Stream& stream);
   void admit(Stream& stream, Microseconds now);
   void compose(Stream& stream);
-  [[nodiscard]] std::span<const TileId> wanted_of(Stream& stream);
+  void answer_meanwhile(Stream& stream);
+  void tell_no_change(const ViewAnswer& answer);
   [[nodiscard]] std::vector<encoder::ViewError> errors_of(const Stream& stream);
   void send_frame(Stream& stream, encoder::ComposeFrame frame);
 
@@ -191,6 +220,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void open_view(Session& session);
   void name_view(Session& session);
   void close_view(Session& session);
+  [[nodiscard]] bool view_due(const Session& session) const;
+  void see_own(Session& session, const ViewJob& job);
   void reallocate_view(Session& session);
   void send_view_work(const Session& session);
   void force_view_key(Session& session);
@@ -203,8 +234,13 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   runtime::MetricSink& metrics_;
   std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials_;  // null: nothing private
   Microseconds period_;
+  double near_;  // options_.near, in metres
   TraceBudget looking_;
   FramePace pace_;
+  FramePace view_pace_;
+  double view_weighing_us_ = 5'000;  // what choosing a private layer's tiles is expected to take
+  std::size_t moving_ = 0;           // views that move
+  std::size_t view_streams_ = 0;     // private layers in use
   ImageStore images_;
   std::shared_ptr<const CoarseLuma> coarse_;  // null: none yet
   std::map<SessionId, std::unique_ptr<Session>> sessions_;

@@ -66,6 +66,12 @@ struct ViewChanged {
       : session(id), sequence(seq), camera(c), viewport(v), stamps(s) {}
   [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
 };
+/// Both would see the very same picture.
+[[nodiscard]] inline bool same_view(const ViewChanged& a, const ViewChanged& b) {
+  return a.camera.position == b.camera.position && a.camera.orientation == b.camera.orientation &&
+         a.camera.fovy == b.camera.fovy && a.viewport.width == b.viewport.width &&
+         a.viewport.height == b.viewport.height;
+}
 
 /// The session lost a frame or joined late: its next frame must be a key frame with the whole page table.
 struct KeyFrameWanted {

@@ -15,14 +15,23 @@ constexpr Microseconds kErrorEvery = 30'000;
 
 // After its first look a session's stream is known. Before, it could be sent nothing anyway.
 void TileSchedulerActor::place(Session& session) {
-  const auto chains = session.set.chains();
-  session.sharp = sharp_tiles(chains);
-  const auto id =
-      groups_.put(session.id, session.format.shared_format(), significant_tiles(chains, options_.significant));
+  session.grouped_at = now_us();
+  const auto id = groups_.put(session.id, session.format.shared_format(),
+                              significant_tiles(chains_of(session.set.seen()), options_.significant));
   if (streams_.contains(id)) metrics_.count("darm_stream_joins_total");
   enter(session, id);
   settle(*session.stream);
   if (session.view_layer) name_view(session);
+}
+
+// What the session sees has changed: does it still belong where it is?
+void TileSchedulerActor::group(Session& session) {
+  session.ungrouped = true;
+  if (now_us() - session.grouped_at < options_.groups.plan_every) return;
+  session.grouped_at = now_us();
+  session.ungrouped = false;
+  groups_.put(session.id, session.format.shared_format(),
+              significant_tiles(chains_of(session.set.seen()), options_.significant));
 }
 
 void TileSchedulerActor::enter(Session& session, StreamId id) {
@@ -33,9 +42,10 @@ void TileSchedulerActor::enter(Session& session, StreamId id) {
     stream->encoder = peers_->make_encoder(id, format);
   }
   stream->members.insert(std::ranges::lower_bound(stream->members, session.id, {}, &Session::id), &session);
-  stream->sharp.add(session.sharp);
   session.stream = stream.get();
-  session.awaits_key = true;
+  session.awaits_key = session.unchosen = true;
+  if (stream->members.size() == 2) gather(*stream);
+  if (stream->members.size() > 2) note_seen(session);
   peers_->set_receivers(id, groups_.members(id));
   metrics_.set("darm_streams", double(streams_.size()));
 }
@@ -46,10 +56,9 @@ void TileSchedulerActor::leave(Session& session) {
   auto& stream = *std::exchange(session.stream, nullptr);
   if (auto open = stream.state.forget_session(session.id); open && !session.answer) session.answer = open;
   std::erase(stream.members, &session);
-  stream.sharp.remove(session.sharp);
-  stream.wanted.remove(std::exchange(session.wanted, {}));
-  session.granted_new = true;
-  stream.joint = {};  // its numbers were those of the members before
+  session.unchosen = false;
+  stream.together.note_change();
+  if (!stream.shared()) stream.together.clear();
   peers_->set_receivers(stream.id, groups_.members(stream.id));
   if (!stream.members.empty()) return;
   peers_->destroy_encoder(stream.id, stream.encoder);
@@ -73,93 +82,80 @@ void TileSchedulerActor::regroup() {
     if (const auto it = streams_.find(id); it != streams_.end()) settle(*it->second);
 }
 
-// Members have come or gone, or their sets have begun or ceased to fit: slots are chosen as that asks for.
+// Members have come or gone.
 void TileSchedulerActor::settle(Stream& stream) {
   work_changed_ = true;
-  if (!stream.crowded()) {
-    for (auto* member : stream.members)
-      if (member->seen || member->demand.joint || member->demand.chains.empty())
-        choose_alone(*member, member->set.chains());
-    return;
-  }
+  stream.unchosen = true;
+  choose_if_due(stream);
+}
+
+// What a session sees counts among what all of its stream see.
+void TileSchedulerActor::note_seen(Session& session) {
+  const bool rests = session.set.passes() > 0;
+  session.stream->together.add(session.set.current(), rests ? SharedSet::kRests : 1.0f);
+}
+
+// Forgets what nobody has seen for a while. Of those who look at the very same picture one knows most.
+void TileSchedulerActor::gather(Stream& stream) {
+  const auto began = now_us();
+  stream.together.renew(began);
   for (auto* member : stream.members)
-    if (!member->seen)
-      member->seen = seen_by(member->set, member->set.chains(), true, images(), coarse_.get(), layout_->coarse_level());
-  stream.allocate_after = 0;
-  choose_together(stream);
+    if (member->set.current().samples() > 0) note_seen(*member);
+  stream.together.renewed(began, now_us());
 }
 
-void TileSchedulerActor::note_weighed(Session& session) {
-  for (auto& request : session.demand.requests) request.target_error = session.target_error;
-  session.weighed_at = now_us();
-  session.pictures_since = false;
-  for (const auto tile : session.demand.target.tiles) images_.touch(tile);
-  session.granted_new = true;
+void TileSchedulerActor::choose_if_due(Stream& stream) {
+  if (stream.unchosen && now_us() >= stream.choose_after) choose(stream);
+}
+
+// Chooses slots for what the members see together, and what is shaded for them.
+void TileSchedulerActor::choose(Stream& stream) {
+  const auto started = now_us();
+  if (stream.shared() && stream.together.stale(started)) gather(stream);
+  const auto rests = [](const Session* member) { return member->set.passes() >= kTapPasses; };
+  const auto seen = stream.shared() ? stream.together.seen(std::ranges::all_of(stream.members, rests))
+                                    : stream.members.front()->set.seen();
+  stream.demand = demand_of(seen, *layout_, stream.state.table(), images(), coarse_.get(), options_.allocation);
+  stream.known.clear();
+  if (stream.shared())
+    for (const auto& item : stream.demand.chains) stream.known.insert(item.chain);
+  set_targets(stream);
+  for (const auto tile : stream.demand.target.tiles) images_.touch(tile);
+  for (auto* member : stream.members) member->unchosen = false;
+  stream.unchosen = stream.ungranted = stream.pictures_since = false;
+  stream.weighed_at = now_us();
   work_changed_ = true;
-  metrics_.observe("darm_view_tiles", double(session.demand.target.tiles.size()));
-}
-
-// Where all sharp tiles fit, and where there is one view, it needs nothing of others.
-void TileSchedulerActor::choose_alone(Session& session, std::vector<WeightedChain> chains) {
-  const auto started = now_us();
-  const auto& table = session.stream->state.table();
-  session.seen.reset();
-  session.demand = demand_of(session.set, std::move(chains), session.sharp.size() > table.capacity(), *layout_, table,
-                             images(), coarse_.get(), options_.allocation);
-  note_weighed(session);
-  metrics_.observe("darm_allocation_seconds", double(now_us() - started) * 1e-6);
-}
-
-// Chooses slots for all members of a crowded stream, if there is a newer view among them. It takes as long for all as
-// for one, and a time that grows with them: so the next one waits for some.
-void TileSchedulerActor::choose_together(Stream& stream) {
-  const auto started = now_us();
-  if (!stream.crowded() || started < stream.allocate_after) return;
-  if (std::ranges::none_of(stream.members, [](const Session* m) { return m->seen.has_value(); })) return;
-  std::vector<ViewDemand*> views;
-  for (auto* member : stream.members) {
-    if (member->seen) member->demand = std::move(*member->seen);
-    member->seen.reset();
-    views.push_back(&member->demand);
-  }
-  stream.joint = join_views(std::vector<const ViewDemand*>(views.begin(), views.end()));
-  share_slots(views, stream.joint, stream.state.table(), images(), layout_->coarse_level(), options_.allocation);
-  for (auto* member : stream.members) {
-    member->demand.requests = requests_of(member->set, *layout_, member->demand);
-    if (coarse_ == nullptr) member->demand.coarse = coarse_texels_seen(member->set.current(), *layout_);
-    note_weighed(*member);
-  }
-  stream.ungranted = false;
+  metrics_.observe("darm_view_tiles", double(stream.demand.target.tiles.size()));
   note_chosen(stream, started);
+  send_work_soon();
 }
 
-// Choosing for all members took so long, until now.
+// As exact as the most exacting member that sees a tile.
+void TileSchedulerActor::set_targets(Stream& stream) const {
+  const auto [least, most] = std::ranges::minmax(stream.members, {}, &Session::target_error);
+  for (auto& request : stream.demand.requests) request.target_error = most->target_error;
+  if (least->target_error == most->target_error) return;
+  for (auto& request : stream.demand.requests)
+    for (const auto* member : stream.members)
+      if (member->target_error < request.target_error && member->set.current().find(request.tile) != nullptr)
+        request.target_error = member->target_error;
+}
+
+// Choosing took so long, until now. It comes before light, so where there are several clients it must leave time.
 void TileSchedulerActor::note_chosen(Stream& stream, Microseconds started) {
   const auto took = double(now_us() - started);
-  const auto crowded = std::ranges::count_if(streams_, [](const auto& entry) { return entry.second->crowded(); });
-  stream.allocate_after = now_us() + static_cast<Microseconds>(took * double(crowded) / options_.weighing);
   metrics_.observe("darm_allocation_seconds", took * 1e-6);
+  if (sessions_.size() < 2) return;
+  stream.choose_after = now_us() + static_cast<Microseconds>(took * double(streams_.size()) / options_.weighing);
 }
 
 // Pictures have come: what can be had now?
 void TileSchedulerActor::grant(Stream& stream) {
-  const auto level = layout_->coarse_level();
   const auto started = now_us();
-  stream.ungranted = stream.crowded() && started < stream.allocate_after;
-  if (stream.ungranted) return;
-  if (stream.crowded() && stream.joint.number.size() == stream.members.size()) {
-    std::vector<ViewDemand*> views;
-    for (auto* member : stream.members) views.push_back(&member->demand);
-    share_available(views, stream.joint, stream.state.table(), images(), level, options_.allocation);
-    for (auto* member : stream.members) member->granted_new = true;
-    return note_chosen(stream, started);
-  }
-  for (auto* member : stream.members) {
-    if (member->demand.joint) continue;
-    const auto before = member->demand.granted.tiles;
-    grant_available(member->demand, level, stream.state.table(), images(), options_.allocation);
-    member->granted_new = member->granted_new || before != member->demand.granted.tiles;
-  }
+  if (started < stream.choose_after) return;
+  stream.ungranted = false;
+  grant_available(stream.demand, layout_->coarse_level(), stream.state.table(), images(), options_.allocation);
+  note_chosen(stream, started);
 }
 
 // Makes the next frame a key frame, unless there was one on demand just now: then a later tick does.
@@ -185,11 +181,12 @@ void TileSchedulerActor::admit(Stream& stream, Microseconds now) {
 void TileSchedulerActor::compose(Stream& stream) {
   const auto started = now_us();
   if (stream.state.in_flight() && !stream.encoder) stream.state.encoder_gone();
-  if (stream.state.in_flight()) return;
+  if (stream.state.in_flight()) {
+    if (stream.shared()) answer_meanwhile(stream);
+    return;
+  }
   if (stream.asked_at == 0) stream.asked_at = started;
-  const bool waits_for_pictures = std::ranges::all_of(stream.members, [](const Session* m) {
-    return m->demand.granted.tiles.empty() && !m->demand.target.tiles.empty();
-  });
+  const bool waits_for_pictures = stream.demand.granted.tiles.empty() && !stream.demand.target.tiles.empty();
   const bool first = stream.state.last_frame() == 0;
   if (first && waits_for_pictures && started - stream.asked_at < options_.first_frame_wait) return;
   admit(stream, started);
@@ -197,18 +194,16 @@ void TileSchedulerActor::compose(Stream& stream) {
   for (auto* member : stream.members) {
     moving = moving || member->set.passes() < options_.passes_unlit;
     // What it does not have a key frame for, or no slots, it cannot be told of yet.
-    if (!member->answer || member->awaits_key || member->seen) continue;
+    if (!member->answer || member->awaits_key || member->unchosen) continue;
     stream.state.view_ready(*std::exchange(member->answer, std::nullopt));
   }
   auto errors = errors_of(stream);
   double squares = 0;
   for (const auto& e : errors) squares += double(e.error) * double(e.error);
   const auto error = static_cast<float>(std::sqrt(squares / double(std::max<std::size_t>(1, errors.size()))));
-  auto step = stream.state.step(wanted_of(stream), images(), error, started, pace_.interval(streams_.size(), moving));
-  for (const auto& answer : step.no_change) {
-    const auto* session = find(answer.session);
-    peers_->sessions->find(answer.session).tell(session::NoChange(answer, session ? session->error : error));
-  }
+  auto step =
+      stream.state.step(stream.demand.granted.tiles, images(), error, started, pace_.interval(streams_.size(), moving));
+  for (const auto& answer : step.no_change) tell_no_change(answer);
   if (step.frame) {
     step.frame->errors = std::move(errors);
     send_frame(stream, std::move(*step.frame));
@@ -216,17 +211,18 @@ void TileSchedulerActor::compose(Stream& stream) {
   metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
 }
 
-// Granted tiles of all members, those first that show most.
-std::span<const TileId> TileSchedulerActor::wanted_of(Stream& stream) {
-  if (stream.members.size() == 1) return stream.members.front()->demand.granted.tiles;
+// Where many share a stream there is nearly always a frame under way: they do not wait for it.
+void TileSchedulerActor::answer_meanwhile(Stream& stream) {
   for (auto* member : stream.members) {
-    if (!std::exchange(member->granted_new, false)) continue;
-    stream.wanted.remove(member->wanted);
-    member->wanted.tiles = member->demand.granted.tiles;
-    member->wanted.weights = member->demand.granted.weights;
-    stream.wanted.add(member->wanted);
+    if (!member->answer || member->awaits_key || member->unchosen) continue;
+    if (stream.state.answers_in_flight(member->id)) continue;  // it is answered in order
+    tell_no_change(*std::exchange(member->answer, std::nullopt));
   }
-  return stream.wanted.list(stream.state.table().capacity());
+}
+
+void TileSchedulerActor::tell_no_change(const ViewAnswer& answer) {
+  const auto* session = find(answer.session);
+  peers_->sessions->find(answer.session).tell(session::NoChange(answer, session ? session->error : 1.0f));
 }
 
 // An error takes a millisecond to know: where many share a stream, each of theirs is looked at less often.
@@ -236,7 +232,12 @@ std::vector<encoder::ViewError> TileSchedulerActor::errors_of(const Stream& stre
   const auto enough = kErrorEvery * static_cast<Microseconds>(stream.members.size() - 1);
   for (auto* member : stream.members) {
     if (!member->error_at || now - *member->error_at >= enough) {
-      member->error = view_error(member->demand, images(), layout_->coarse_level(), coarse_ != nullptr);
+      const auto& demand = stream.demand;
+      const bool coarse = coarse_ != nullptr;
+      member->error =
+          stream.shared()
+              ? view_error(member->set.current(), stream.known, demand, images(), layout_->coarse_level(), coarse)
+              : view_error(demand.chains, demand.granted.served, images(), layout_->coarse_level(), coarse);
       member->error_at = now;
     }
     out.push_back({member->id, member->error});

@@ -1,9 +1,15 @@
 // The private layer of each session: light that depends on its eye.
+#include <algorithm>
 #include <utility>
 
 #include "actors/tile_scheduler/tile_scheduler_actor.hpp"
 
 namespace darm::tile_scheduler {
+namespace {
+
+constexpr double kLearned = 0.1;  // weight of the newest
+
+}  // namespace
 
 void TileSchedulerActor::open_view(Session& session) {
   StreamOptions stream = options_.stream;
@@ -24,21 +30,42 @@ void TileSchedulerActor::close_view(Session& session) {
   if (session.view_encoder) peers_->destroy_encoder(session.view_stream_id, session.view_encoder);
 }
 
+// A new eye has all its private tiles chosen, made and shaded again: where there are many, each is served less often.
+bool TileSchedulerActor::view_due(const Session& session) const {
+  if (sessions_.size() < 2) return true;
+  const double each = std::max(view_weighing_us_ / options_.weighing_views, double(options_.view_interval));
+  return now_us() - session.view_weighed_at >= static_cast<Microseconds>(each * double(sessions_.size()));
+}
+
+void TileSchedulerActor::see_own(Session& session, const ViewJob& job) {
+  if (job.private_results().empty()) return;
+  auto& layer = *session.view_layer;
+  if (!session.view_posed || !same_view(*session.view_posed, *session.posed)) layer.start_pose(now_us());
+  session.view_posed = session.posed;
+  for (const auto& part : job.private_results()) layer.add(part);
+  session.view_unweighed = true;
+  reallocate_view(session);
+}
+
 // Chooses private tiles for what the eye sees, and has them shaded for where it is.
 void TileSchedulerActor::reallocate_view(Session& session) {
+  if (!view_due(session)) return;
   const auto started = now_us();
+  session.view_weighed_at = started;
+  session.view_unweighed = false;
   auto& layer = *session.view_layer;
   const bool had = layer.target_size() > 0;
   layer.reallocate(options_.allocation, layout_->coarse_level());
   metrics_.observe("darm_view_allocation_seconds", double(now_us() - started) * 1e-6);
   metrics_.observe("darm_view_private_tiles", double(layer.target_size()));
   if (layer.target_size() > 0 || had) send_view_work(session);
+  view_weighing_us_ += kLearned * (double(now_us() - started) - view_weighing_us_);
 }
 
 // Until CoarseTex is there nobody has a picture at all, and the cores are the shared light's.
 void TileSchedulerActor::send_view_work(const Session& session) {
-  if (coarse_ == nullptr || !session.posed) return;
-  const glm::vec3 eye(session.posed->camera.position - rays_->scene().origin);
+  if (coarse_ == nullptr || !session.view_posed) return;
+  const glm::vec3 eye(session.view_posed->camera.position - rays_->scene().origin);
   peers_->view_renderer().tell(
       renderer::ShadeView(session.id, eye, session.target_error, session.view_layer->requests()));
 }
@@ -57,7 +84,7 @@ void TileSchedulerActor::force_view_key(Session& session) {
 void TileSchedulerActor::compose_view(Session& session) {
   if (!session.view_layer || session.view_layer->idle()) return;
   if (session.view_layer->stream().in_flight() && !session.view_encoder) session.view_layer->stream().encoder_gone();
-  auto step = session.view_layer->step(now_us());
+  auto step = session.view_layer->step(now_us(), view_pace_.interval(view_streams_, false));
   if (!step.frame) return;
   if (!session.view_encoder)
     session.view_encoder = peers_->make_encoder(session.view_stream_id, session.format.view_format());

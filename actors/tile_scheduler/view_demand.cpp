@@ -47,7 +47,7 @@ float weight_beside(const atlas::Layout& layout, const ViewDemand& demand, const
 
 }  // namespace
 
-std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout& layout, const ViewDemand& demand) {
+std::vector<TileRequest> requests_of(const Seen& seen, const atlas::Layout& layout, const ViewDemand& demand) {
   const Target target(demand);
   TileIndex requested;
   std::vector<TileRequest> out;
@@ -61,7 +61,7 @@ std::vector<TileRequest> requests_of(const WorkingSet& set, const atlas::Layout&
     }
     out[number].mask |= mask;
   };
-  set.for_each_use([&](TileId tile, const TileUse& use) {
+  for_each_use(seen, [&](TileId tile, const TileUse& use) {
     const auto number = target.tiles.find(tile);
     TexelMask mask = use.border;
     if (number != TileIndex::kAbsent) {
@@ -106,17 +106,6 @@ std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, dou
   return out;
 }
 
-ViewDemand seen_by(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded, const ImageLookup& images,
-                   const CoarseLuma* coarse, int coarse_level) {
-  ViewDemand demand;
-  demand.chains = std::move(chains);
-  demand.crowded = crowded;
-  demand.rests = set.passes() >= kTapPasses;
-  // The chains of the present pose come first in chains(), by the numbers that its taps use.
-  if (crowded) demand.losses = measure_losses(demand.chains, set.current().taps(), images, coarse, coarse_level);
-  return demand;
-}
-
 std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, const atlas::Layout& layout) {
   const auto& level = layout.levels.back();
   TileIndex tiles;
@@ -135,10 +124,15 @@ std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, 
   return out;
 }
 
-ViewDemand demand_of(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded,
-                     const atlas::Layout& layout, const PageTable& table, const ImageLookup& images,
+ViewDemand demand_of(const Seen& seen, const atlas::Layout& layout, const PageTable& table, const ImageLookup& images,
                      const CoarseLuma* coarse, const AllocationOptions& options) {
-  auto demand = seen_by(set, std::move(chains), crowded, images, coarse, layout.coarse_level());
+  ViewDemand demand;
+  demand.chains = chains_of(seen);
+  demand.crowded = sharp_tiles(demand.chains).size() > table.capacity();
+  demand.rests = seen.rests;
+  // The chains of the newest part come first, by the numbers that its taps use.
+  if (demand.crowded)
+    demand.losses = measure_losses(demand.chains, seen.newest().taps(), images, coarse, layout.coarse_level());
   const auto residents = table.residents();
   demand.target = allocate_slots({.chains = demand.chains,
                                   .residents = residents,
@@ -148,8 +142,8 @@ ViewDemand demand_of(const WorkingSet& set, std::vector<WeightedChain> chains, b
                                   .exchange = demand.rests},
                                  options);
   grant_available(demand, layout.coarse_level(), table, images, options);
-  demand.requests = requests_of(set, layout, demand);
-  if (coarse == nullptr) demand.coarse = coarse_texels_seen(set.current(), layout);
+  demand.requests = requests_of(seen, layout, demand);
+  if (coarse == nullptr) demand.coarse = coarse_texels_seen(seen.newest(), layout);
   return demand;
 }
 
@@ -184,16 +178,16 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
                                   options);
 }
 
-float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse_level, bool has_coarse,
-                 const ErrorOptions& options) {
+float view_error(std::span<const WeightedChain> chains, std::span<const std::uint8_t> served, const ImageLookup& images,
+                 int coarse_level, bool has_coarse, const ErrorOptions& options) {
   const auto too_coarse = [&](int levels) {
     return double(options.coarser[static_cast<std::size_t>(std::clamp(levels, 0, 4))]);
   };
   double sum = 0;
   double weight = 0;
-  for (std::size_t c = 0; c < demand.chains.size(); ++c) {
-    const auto& [chain, share] = demand.chains[c];
-    const auto position = demand.granted.served[c];
+  for (std::size_t c = 0; c < chains.size(); ++c) {
+    const auto& [chain, share] = chains[c];
+    const auto position = served[c];
     double squared = double(options.unlit) * double(options.unlit);
     if (position < kChainLength) {
       if (const auto* stored = images(chain.tiles[position]))
@@ -205,6 +199,27 @@ float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse
     weight += double(share);
   }
   return weight > 0 ? static_cast<float>(std::sqrt(sum / weight)) : options.unlit;
+}
+
+float view_error(const VisibleSet& view, const ChainIndex& known, const ViewDemand& demand, const ImageLookup& images,
+                 int coarse_level, bool has_coarse, const ErrorOptions& options) {
+  std::vector<WeightedChain> chains;
+  std::vector<std::uint8_t> served;
+  for (std::size_t c = 0; c < view.chains().size(); ++c) {
+    const auto number = known.find(view.chains()[c]);
+    chains.push_back({view.chains()[c], view.counts()[c]});
+    served.push_back(number == ChainIndex::kAbsent ? std::uint8_t{kServedByCoarse} : demand.granted.served[number]);
+  }
+  return view_error(chains, served, images, coarse_level, has_coarse, options);
+}
+
+float known_share(const VisibleSet& view, const ChainIndex& known) {
+  double all = 0, found = 0;
+  for (std::size_t c = 0; c < view.chains().size(); ++c) {
+    all += double(view.counts()[c]);
+    if (known.find(view.chains()[c]) != ChainIndex::kAbsent) found += double(view.counts()[c]);
+  }
+  return all > 0 ? static_cast<float>(found / all) : 1.0f;
 }
 
 std::vector<TileRequest> join_requests(const std::vector<const std::vector<TileRequest>*>& views) {

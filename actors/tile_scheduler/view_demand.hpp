@@ -1,4 +1,4 @@
-// From a working set to decisions: which tiles a view should have, which it can have now, what must be shaded. Pure.
+// From what is seen to decisions: which tiles should be there, which can be now, what must be shaded. Pure.
 #pragma once
 
 #include <array>
@@ -8,19 +8,18 @@
 #include "actors/atlas/layout.hpp"
 #include "actors/renderer/renderer_messages.hpp"
 #include "actors/tile_scheduler/chain_loss.hpp"
+#include "actors/tile_scheduler/seen.hpp"
 #include "actors/tile_scheduler/slot_allocation.hpp"
 #include "actors/tile_scheduler/stream_state.hpp"
-#include "actors/tile_scheduler/working_set.hpp"
 
 namespace darm::tile_scheduler {
 
-/// What a view asks for, newest allocation.
+/// What a view asks for, or all views of a stream together; newest allocation.
 struct ViewDemand {
   std::vector<WeightedChain> chains;
   float lit = 0;                                ///< share of what the target serves whose tiles have pictures, 0..1
   bool crowded = false;                         ///< the sharp tiles do not all fit: what coarser ones lose decides
   bool rests = false;                           ///< it has been looked at closely: slots are chosen with more care
-  bool joint = false;                           ///< its slots were chosen together with other views' (share_slots())
   std::vector<ChainLoss> losses;                ///< measured if crowded and there are pictures, else empty
   Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded
   Allocation granted;                           ///< the tiles it can have now: these get slots
@@ -39,19 +38,15 @@ struct ViewDemand {
 /// view show next to nothing of it.
 [[nodiscard]] std::vector<TileId> significant_tiles(std::span<const WeightedChain> chains, double share);
 
-/// What a view sees, without any decision; what coarser levels lose is measured if `crowded`. `chains`: set.chains().
-[[nodiscard]] ViewDemand seen_by(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded,
-                                 const ImageLookup& images, const CoarseLuma* coarse, int coarse_level);
-
-/// What must be shaded for `demand.target`; `set` is what `demand` was made from.
-[[nodiscard]] std::vector<renderer::TileRequest> requests_of(const WorkingSet& set, const atlas::Layout& layout,
+/// What must be shaded for `demand.target`; `seen` is what `demand` was made from.
+[[nodiscard]] std::vector<renderer::TileRequest> requests_of(const Seen& seen, const atlas::Layout& layout,
                                                              const ViewDemand& demand);
 
-/// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. `chains`:
-/// set.chains(); `crowded`: they have more sharp tiles than `table` has slots; `coarse`: see measure_losses().
-[[nodiscard]] ViewDemand demand_of(const WorkingSet& set, std::vector<WeightedChain> chains, bool crowded,
-                                   const atlas::Layout& layout, const PageTable& table, const ImageLookup& images,
-                                   const CoarseLuma* coarse, const AllocationOptions& options);
+/// Chooses target and granted tiles for the slots of `table` and makes the shading requests of the target. What coarser
+/// levels lose is measured where there are more sharp tiles than slots; `coarse`: see measure_losses().
+[[nodiscard]] ViewDemand demand_of(const Seen& seen, const atlas::Layout& layout, const PageTable& table,
+                                   const ImageLookup& images, const CoarseLuma* coarse,
+                                   const AllocationOptions& options);
 
 /// Sets `demand.lit`; true if every tile of the target has a picture.
 bool note_lit(ViewDemand& demand, const ImageLookup& images);
@@ -68,9 +63,17 @@ struct ErrorOptions {
 };
 
 /// Estimated display error of the light a view has: RMS over its samples of the error of the tile that serves each and
-/// of how much coarser than sharp it is. `has_coarse`: CoarseTex serves what no tile does. 0..1.
-[[nodiscard]] float view_error(const ViewDemand& demand, const ImageLookup& images, int coarse_level, bool has_coarse,
+/// of how much coarser than sharp it is. `has_coarse`: CoarseTex serves what no tile does. 0..1. `served`: parallel to
+/// `chains`, as Allocation has it.
+[[nodiscard]] float view_error(std::span<const WeightedChain> chains, std::span<const std::uint8_t> served,
+                               const ImageLookup& images, int coarse_level, bool has_coarse,
                                const ErrorOptions& options = {});
+/// Of one view among those that `demand` is of. `known`: numbers of demand.chains; what is not among them has nothing.
+[[nodiscard]] float view_error(const VisibleSet& view, const ChainIndex& known, const ViewDemand& demand,
+                               const ImageLookup& images, int coarse_level, bool has_coarse,
+                               const ErrorOptions& options = {});
+/// Share of the samples of `view` whose chains are among `known`, 0..1; 1 without samples on a surface.
+[[nodiscard]] float known_share(const VisibleSet& view, const ChainIndex& known);
 
 /// The requests of all views as one working set: weights add, masks join, displayed if any view displays it, as
 /// exact as the most exacting one asks.

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "actors/tile_scheduler/visibility.hpp"
@@ -19,12 +20,13 @@ inline constexpr std::uint32_t kRaysPerStep = 2048;
 /// may read `results`.
 class ViewJob {
  public:
-  /// `materials`, by instance: gathers also what depends on the eye.
+  /// `materials`, by instance: gathers also what depends on the eye. `rays_per_pass`: as trace_rows() has it.
   /// Traces passes [first_pass, first_pass + pass_count) in at most `slices` slices (at least 1).
   ViewJob(std::uint64_t number, std::shared_ptr<const atlas::Layout> layout,
           std::shared_ptr<const renderer::trace::RayScene> rays, const Camera& camera, const Viewport& viewport,
           int first_pass, int pass_count, unsigned slices,
-          std::shared_ptr<const std::vector<scene::ViewMaterial>> materials = nullptr);
+          std::shared_ptr<const std::vector<scene::ViewMaterial>> materials = nullptr,
+          std::uint32_t rays_per_pass = kMaxRays);
 
   enum class Step : std::uint8_t { kMore, kSliceDone, kAllDone };
   /// Traces a few milliseconds' worth of rows of a slice: at least one, and no more than kRaysPerStep rays with it.
@@ -36,7 +38,6 @@ class ViewJob {
 
   [[nodiscard]] std::uint64_t number() const { return number_; }
   [[nodiscard]] unsigned slice_count() const { return static_cast<unsigned>(results_.size()); }
-  [[nodiscard]] int pass_count() const { return pass_count_; }
   /// Camera rays of the whole job.
   [[nodiscard]] std::uint64_t rays() const;
   /// What steps took is told to the job, because many threads take them. Thread-safe.
@@ -44,11 +45,17 @@ class ViewJob {
   [[nodiscard]] Microseconds busy() const { return busy_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool done() const { return left_.load(std::memory_order_acquire) == 0; }
   [[nodiscard]] const std::vector<VisibleSet>& results() const { return results_; }
+  /// The same, to keep: the job has none after that.
+  [[nodiscard]] std::vector<VisibleSet> take_results() { return std::move(results_); }
+  /// Picture samples of all results, once done.
+  [[nodiscard]] double samples() const;
   /// What depends on the eye; empty if no materials were given.
   [[nodiscard]] const std::vector<PrivateSet>& private_results() const { return private_; }
 
   ViewAnswer answer;         ///< the camera that the result answers; for the owner, slices do not touch it
   bool starts_pose = false;  ///< the result belongs to a new pose
+  /// Whole passes that are done with it: none of a glance.
+  [[nodiscard]] int whole_passes() const { return rays_per_pass_ < kMaxRays ? 0 : pass_count_; }
 
  private:
   // Where a slice goes on.
@@ -64,6 +71,7 @@ class ViewJob {
   ViewSampler sampler_;
   int first_pass_;
   int pass_count_;
+  std::uint32_t rays_per_pass_;
   std::shared_ptr<const std::vector<scene::ViewMaterial>> materials_;  // null: nothing private is gathered
   std::vector<VisibleSet> results_;
   std::vector<PrivateSet> private_;

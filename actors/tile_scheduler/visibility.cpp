@@ -30,8 +30,7 @@ constexpr std::array<std::array<std::uint8_t, 2>, kPassesPerPicture> kOrder{{{0,
                                                                              {0, 3}}};
 
 void set_box(TexelMask& mask, const TexelBox& part) {
-  for (int y = part.y0; y <= part.y1; ++y)
-    for (int x = part.x0; x <= part.x1; ++x) mask.set(x, y);
+  for (int y = part.y0; y <= part.y1; ++y) mask.set_row(part.x0, part.x1, y);
 }
 
 // Where texel position `texel` lies inside the slot of its tile: the payload begins at 1.
@@ -59,7 +58,7 @@ void mark_early(const atlas::Layout& layout, const SurfaceSample& sample, float 
   box.y1 = std::min(high.y1, static_cast<int>(place.y) + static_cast<int>(std::ceil(extent.y)));
   if (box.x0 > box.x1 || box.y0 > box.y1) return;
   for_each_tile_part(level, sample.level, box, [&](TileId tile, const TexelBox& part) {
-    if (auto* use = out.use(tile)) set_box(use->early, part);
+    if (auto* use = out.use(tile)) set_box(use->mark(TileUse::kEarly), part);
   });
 }
 
@@ -74,21 +73,21 @@ glm::vec2 pass_offset(int pass) {
   return glm::vec2(pixel[0], pixel[1]) + kClientSamples[sample];
 }
 
-float block_side(const Viewport& viewport) {
+float block_side(const Viewport& viewport, std::uint32_t rays) {
   const double pixels = double(viewport.width) * double(viewport.height);
-  return static_cast<float>(std::max(double{kBlock}, std::sqrt(pixels / kMaxRays)));
+  return static_cast<float>(std::max(double{kBlock}, std::sqrt(pixels / std::clamp(rays, 1u, kMaxRays))));
 }
 
-int passes_per_picture(const Viewport& viewport) {
-  const float side = block_side(viewport);
+int passes_per_picture(const Viewport& viewport, std::uint32_t rays) {
+  const float side = block_side(viewport, rays);
   return static_cast<int>(std::ceil(side * side));
 }
 
-std::uint32_t block_rows(const Viewport& viewport) {
-  return static_cast<std::uint32_t>(std::ceil(static_cast<float>(viewport.height) / block_side(viewport)));
+std::uint32_t block_rows(const Viewport& viewport, std::uint32_t rays) {
+  return static_cast<std::uint32_t>(std::ceil(static_cast<float>(viewport.height) / block_side(viewport, rays)));
 }
-std::uint32_t block_columns(const Viewport& viewport) {
-  return static_cast<std::uint32_t>(std::ceil(static_cast<float>(viewport.width) / block_side(viewport)));
+std::uint32_t block_columns(const Viewport& viewport, std::uint32_t rays) {
+  return static_cast<std::uint32_t>(std::ceil(static_cast<float>(viewport.width) / block_side(viewport, rays)));
 }
 
 Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample) {
@@ -115,7 +114,10 @@ void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float 
     for_each_tile_part(level, level_number, box, [&](TileId tile, const TexelBox& part) {
       auto* use = out.use(tile);
       if (use == nullptr) return;
-      set_box(tile != chain.tiles[i] ? use->border : i == 0 ? use->sharp : use->fallback, part);
+      set_box(use->mark(tile != chain.tiles[i] ? TileUse::kBorder
+                        : i == 0               ? TileUse::kSharp
+                                               : TileUse::kFallback),
+              part);
     });
   }
   if (note_taps) {
@@ -134,19 +136,19 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
 }
 
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out,
-                const PrivateSamples& own) {
+                const PrivateSamples& own, std::uint32_t rays) {
   const renderer::trace::DenormalsAreZero denormals;
   const auto& viewport = sampler.viewport();
-  const float side = block_side(viewport);
+  const float side = block_side(viewport, rays);
   const glm::vec2 offset = pass_offset(pass) * (side / kBlock);
   // After k passes a sample stands for a square of side / sqrt(k) pixels a side; the reach is half of it.
   const float early =
-      pass < passes_per_picture(viewport) ? 0.5f * side / std::sqrt(static_cast<float>(pass + 1)) : 0.0f;
+      pass < passes_per_picture(viewport, rays) ? 0.5f * side / std::sqrt(static_cast<float>(pass + 1)) : 0.0f;
   const bool note_taps = pass < kTapPasses;
   const bool gather = own.set != nullptr && !own.materials.empty();
   const auto width = static_cast<float>(viewport.width);
   const auto height = static_cast<float>(viewport.height);
-  const auto columns = block_columns(viewport);
+  const auto columns = block_columns(viewport, rays);
   std::array<SurfaceSample, kMaxLayers> surfaces;
   double samples = 0;
   for (std::uint32_t row = first_row; row < last_row; ++row) {

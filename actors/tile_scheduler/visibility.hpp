@@ -32,13 +32,13 @@ inline constexpr std::array<glm::vec2, 4> kClientSamples{
 /// Bayer matrix (any first 2^k passes are spread evenly), each time at another of the client's sample positions.
 [[nodiscard]] glm::vec2 pass_offset(int pass);
 
-/// Pixels per side of this picture's blocks: kBlock, or as much more as keeps it at about kMaxRays blocks.
-[[nodiscard]] float block_side(const Viewport& viewport);
+/// Pixels per side of this picture's blocks: kBlock, or as much more as keeps it at about `rays` blocks (at least 1).
+[[nodiscard]] float block_side(const Viewport& viewport, std::uint32_t rays = kMaxRays);
 /// Passes after which there has been one sample per pixel: kPassesPerPicture with blocks of kBlock.
-[[nodiscard]] int passes_per_picture(const Viewport& viewport);
+[[nodiscard]] int passes_per_picture(const Viewport& viewport, std::uint32_t rays = kMaxRays);
 /// Blocks of a picture; a pass traces one ray per block whose position lies inside the picture.
-[[nodiscard]] std::uint32_t block_rows(const Viewport& viewport);
-[[nodiscard]] std::uint32_t block_columns(const Viewport& viewport);
+[[nodiscard]] std::uint32_t block_rows(const Viewport& viewport, std::uint32_t rays = kMaxRays);
+[[nodiscard]] std::uint32_t block_columns(const Viewport& viewport, std::uint32_t rays = kMaxRays);
 
 /// Traces rows [first_row, last_row) of blocks in pass `pass` into `out`. In the first passes_per_picture() passes each
 /// sample also marks the texels around it that the unseen pixels of its block probably read (TileUse::early).
@@ -49,8 +49,9 @@ struct PrivateSamples {
   std::span<const scene::ViewMaterial> materials;  ///< by instance; empty: nothing is gathered
   PrivateSet* set = nullptr;
 };
+/// `rays`: of a pass, as block_side() has it. Fewer than kMaxRays make a glance, not a pass.
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out,
-                const PrivateSamples& own);
+                const PrivateSamples& own, std::uint32_t rays = kMaxRays);
 
 /// Chain of a surface sample: its tile at the sharp level and at up to three coarser ones.
 [[nodiscard]] Chain chain_of(const atlas::Layout& layout, const SurfaceSample& sample);

@@ -35,10 +35,11 @@ TileUse* VisibleSet::use(TileId tile) {
   return &uses_[number];
 }
 
-void VisibleSet::merge(const VisibleSet& other) {
+void VisibleSet::merge(const VisibleSet& other, float share, std::size_t most_taps) {
   std::vector<std::uint32_t> number(other.chains().size());
-  for (std::size_t i = 0; i < other.chains().size(); ++i) number[i] = add(other.chains()[i], other.counts_[i]);
+  for (std::size_t i = 0; i < other.chains().size(); ++i) number[i] = add(other.chains()[i], other.counts_[i] * share);
   for (auto taps : other.taps_) {
+    if (taps_.size() >= most_taps) break;
     taps.chain = number[taps.chain];
     add_taps(taps);
   }
@@ -46,17 +47,28 @@ void VisibleSet::merge(const VisibleSet& other) {
     auto* mine = use(other.tiles()[i]);
     if (mine == nullptr) continue;
     const auto& theirs = other.uses_[i];
-    mine->sharp |= theirs.sharp;
-    mine->early |= theirs.early;
-    mine->fallback |= theirs.fallback;
-    mine->border |= theirs.border;
+    mine->kinds |= theirs.kinds;
+    if (theirs.kinds & TileUse::kSharp) mine->sharp |= theirs.sharp;
+    if (theirs.kinds & TileUse::kEarly) mine->early |= theirs.early;
+    if (theirs.kinds & TileUse::kFallback) mine->fallback |= theirs.fallback;
+    if (theirs.kinds & TileUse::kBorder) mine->border |= theirs.border;
   }
-  samples_ += other.samples_;
+  samples_ += other.samples_ * double{share};
   left_out_ += other.left_out_;
 }
 
+void VisibleSet::reserve(std::size_t chains, std::size_t tiles) {
+  chains_.reserve(chains);
+  counts_.reserve(chains);
+  tiles_.reserve(tiles);
+  uses_.reserve(tiles);
+}
+
 void VisibleSet::forget_early() {
-  for (auto& use : uses_) use.early = TexelMask{};
+  for (auto& use : uses_) {
+    use.early = TexelMask{};
+    use.kinds &= static_cast<std::uint8_t>(~TileUse::kEarly);
+  }
 }
 
 void VisibleSet::clear() { *this = VisibleSet{}; }

@@ -19,6 +19,14 @@ struct TileUse {
   TexelMask early;     ///< probably read so: within the footprint of the block of pixels a sparse sample stands for
   TexelMask fallback;  ///< read by samples of this tile if it serves a finer chain
   TexelMask border;    ///< read by samples of a neighbouring tile across the edge
+
+  /// Those that hold something; a mask that is none of them is empty. (Most tiles have one, and a set has thousands.)
+  enum Kind : std::uint8_t { kSharp = 1, kEarly = 2, kFallback = 4, kBorder = 8 };
+  std::uint8_t kinds = 0;
+  TexelMask& mark(Kind kind) {
+    kinds |= kind;
+    return kind == kSharp ? sharp : kind == kEarly ? early : kind == kFallback ? fallback : border;
+  }
 };
 
 /// Accumulates samples of one camera. Bounded: past the limits new chains and tiles are left out (and counted).
@@ -37,12 +45,16 @@ class VisibleSet {
   void add_samples(double count) { samples_ += count; }
   /// The texels of `tile`; null if the set is full. Valid until the next call.
   TileUse* use(TileId tile);
-  void merge(const VisibleSet& other);
+  /// `share`: of the weight of the other's samples; more taps than `most_taps` are left out.
+  void merge(const VisibleSet& other, float share = 1.0f, std::size_t most_taps = kMaxTaps);
+  /// Room for so many, so that tables need not grow step by step.
+  void reserve(std::size_t chains, std::size_t tiles);
   void forget_early();
   void clear();
 
   [[nodiscard]] double samples() const { return samples_; }  ///< picture samples traced, hits or not
   [[nodiscard]] const std::vector<Chain>& chains() const { return chains_.keys(); }
+  [[nodiscard]] const ChainIndex& chain_index() const { return chains_; }
   [[nodiscard]] std::span<const float> counts() const { return counts_; }  ///< parallel to chains()
   [[nodiscard]] std::span<const SampleTaps> taps() const { return taps_; }
   [[nodiscard]] const std::vector<TileId>& tiles() const { return tiles_.keys(); }

@@ -16,6 +16,14 @@ class TexelMask {
     const auto bit = static_cast<unsigned>(y * kTileSize + x);
     words_[bit >> 6] |= std::uint64_t{1} << (bit & 63u);
   }
+  /// Texels x0..x1 of row y; 0 <= x0 <= x1 < 30.
+  constexpr void set_row(int x0, int x1, int y) {
+    const auto first = static_cast<unsigned>(y * kTileSize + x0);
+    const std::uint64_t run = (std::uint64_t{1} << static_cast<unsigned>(x1 - x0 + 1)) - 1;
+    const unsigned shift = first & 63u;
+    words_[first >> 6] |= run << shift;
+    if (const auto beyond = run >> (63u - shift) >> 1; beyond != 0) words_[(first >> 6) + 1] |= beyond;
+  }
   [[nodiscard]] constexpr bool test(int x, int y) const {
     const auto bit = static_cast<unsigned>(y * kTileSize + x);
     return (words_[bit >> 6] >> (bit & 63u)) & 1u;

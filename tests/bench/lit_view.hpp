@@ -55,7 +55,7 @@ inline Result<void> open_view(LitView& view, const std::string& camera) {
     for (const auto& part : job.results()) view.set.add(part, 0);
     view.set.add(tile_scheduler::VisibleSet(), 1);
   }
-  view.chains = view.set.chains();
+  view.chains = tile_scheduler::chains_of(view.set.seen());
   return {};
 }
 
@@ -74,7 +74,7 @@ inline Result<void> open_view(LitView& view, const char* setup, const char* scen
 /// What a daemon lights for this view: sharp texels, those of coarser tiles that may stand in, and borders.
 inline TileMasks wanted_texels(const LitView& view) {
   TileMasks masks;
-  view.set.for_each_use([&](TileId tile, const tile_scheduler::TileUse& use) {
+  tile_scheduler::for_each_use(view.set.seen(), [&](TileId tile, const tile_scheduler::TileUse& use) {
     auto& mask = masks[tile];
     mask |= use.sharp;
     mask |= use.fallback;

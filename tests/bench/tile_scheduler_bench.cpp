@@ -70,7 +70,7 @@ void report_trace(const World& world, const Camera& camera, WorkingSet& set) {
 }
 
 void report_slots(const World& world, const WorkingSet& set, std::size_t slots) {
-  const auto chains = set.chains();
+  const auto chains = chains_of(set.seen());
   AllocationRequest request;
   request.chains = chains;
   request.slots = slots;
@@ -114,11 +114,7 @@ int main(int argc, char** argv) {
   const PageTable table(4096);
   ViewDemand demand;
   const auto none = [](TileId) -> const StoredImage* { return nullptr; };
-  const double spent = milliseconds([&] {
-    auto chains = set.chains();
-    const bool crowded = sharp_tiles(chains).size() > table.capacity();
-    demand = demand_of(set, std::move(chains), crowded, *world->layout, table, none, nullptr, {});
-  });
+  const double spent = milliseconds([&] { demand = demand_of(set.seen(), *world->layout, table, none, nullptr, {}); });
   std::printf(" \"demand_ms\": %.2f, \"requests\": %zu,\n", spent, demand.requests.size());
   ViewReport report;
   const double reported =

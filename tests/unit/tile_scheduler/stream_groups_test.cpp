@@ -28,6 +28,14 @@ std::vector<TileId> tiles(std::uint32_t first, std::uint32_t count) {
 SessionId session(std::size_t number) { return SessionId{number + 1}; }
 
 // 100 slots unless a test says otherwise.
+// Times that the tests below count on.
+GroupOptions timed() {
+  GroupOptions options;
+  options.join_after = 2'000'000;
+  options.split_after = 500'000;
+  return options;
+}
+
 class StreamGroupsTest : public ::testing::Test {
  protected:
   StreamId put(std::size_t who, std::vector<TileId> set, const StreamFormat& f = format()) {
@@ -46,7 +54,7 @@ class StreamGroupsTest : public ::testing::Test {
   }
   std::uint32_t next_ = 1;
   Microseconds now_ = 0;
-  StreamGroups groups_{GroupOptions(), [this] { return StreamId{next_++}; }};
+  StreamGroups groups_{timed(), [this] { return StreamId{next_++}; }};
 };
 
 TEST_F(StreamGroupsTest, WhoSeesMuchTheSameSharesAStreamFromTheFirstLook) {
@@ -274,7 +282,7 @@ TEST_P(AnyViews, ThatTrembleAreNotJoinedAndSplitByTurns) {
 TEST_P(AnyViews, LeadToTheSameStreamsEachTime) {
   const auto run = [&] {
     std::vector<GroupMove> all;
-    StreamGroups groups(GroupOptions(), [next = 1u]() mutable { return StreamId{next++}; });
+    StreamGroups groups(timed(), [next = 1u]() mutable { return StreamId{next++}; });
     testing::Random random(GetParam());
     for (int update = 0; update < 100; ++update) {
       for (std::size_t i = 0; i < 30; ++i) groups.put(session(i), format(), tiles(random() % 100, 30 + random() % 50));

@@ -50,6 +50,27 @@ TEST(TraceBudget, MovingViewsAreNotAskedAndTakeFromRefining) {
   EXPECT_TRUE(budget.allows(3'000'000)) << "and a second or two later it is over";
 }
 
+TEST(TraceBudget, ManyWhoMoveShareOutWhatLookingMayTake) {
+  TraceBudget budget(0.3, 0.8);
+  EXPECT_EQ(budget.glance(2, 100'000), 40'000u);
+  EXPECT_EQ(budget.glance(100, 100'000), 800u);
+  EXPECT_EQ(budget.glance(1'000'000, 100'000), TraceBudget::kLeastGlance);
+  for (int i = 0; i < 100; ++i) {  // a ray takes twice as long as it was thought to
+    budget.begin(1000, i);
+    budget.end(1000, 2000);
+  }
+  EXPECT_NEAR(budget.glance(10, 100'000), 4000, 40);
+  EXPECT_GT(budget.glance(0, 100'000), 0u);
+  EXPECT_EQ(budget.glance(5, 0), TraceBudget::kLeastGlance);
+}
+
+TEST(TraceBudget, WhatManyTookIsPaidOffInSeconds) {
+  TraceBudget budget(0.3, 0.8);
+  for (Microseconds now = 0; now < 60'000'000; now += 100'000) budget.begin(80'000, now);
+  EXPECT_FALSE(budget.allows(60'000'000));
+  EXPECT_TRUE(budget.allows(62'000'000));
+}
+
 TEST(TraceBudget, APauseIsNotSavedUp) {
   TraceBudget budget(0.5);
   EXPECT_TRUE(budget.allows(60'000'000));

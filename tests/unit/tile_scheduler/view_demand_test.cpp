@@ -7,6 +7,7 @@
 
 #include "actors/tile_scheduler/image_store.hpp"
 #include "actors/tile_scheduler/visibility.hpp"
+#include "actors/tile_scheduler/working_set.hpp"
 #include "tests/unit/tile_scheduler/quad_scene.hpp"
 
 namespace darm::tile_scheduler {
@@ -25,9 +26,8 @@ class Demand : public ::testing::Test {
     }
   }
   [[nodiscard]] ViewDemand demand(std::size_t slots, const CoarseLuma* coarse = nullptr) const {
-    const bool crowded = sharp_tiles(set_.chains()).size() > slots;
     const auto images = [this](TileId t) { return find(t); };
-    return demand_of(set_, set_.chains(), crowded, *world_.layout, PageTable(slots), images, coarse, {});
+    return demand_of(set_.seen(), *world_.layout, PageTable(slots), images, coarse, {});
   }
   [[nodiscard]] const StoredImage* find(TileId tile) const {
     const auto it = images_.find(tile);
@@ -94,7 +94,8 @@ TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
   auto d = demand(4096);
   EXPECT_TRUE(d.granted.tiles.empty());
   const auto error = [&](bool has_coarse) {
-    return view_error(d, [this](TileId t) { return find(t); }, world_.layout->coarse_level(), has_coarse);
+    return view_error(
+        d.chains, d.granted.served, [this](TileId t) { return find(t); }, world_.layout->coarse_level(), has_coarse);
   };
   EXPECT_FLOAT_EQ(error(false), ErrorOptions{}.unlit);
   EXPECT_LE(error(true), ErrorOptions{}.coarser.back());

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "actors/tile_scheduler/texel_taps.hpp"
+#include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
 #include "actors/tile_scheduler/working_set.hpp"
 #include "tests/unit/tile_scheduler/quad_scene.hpp"
@@ -289,7 +290,7 @@ TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
   set.add(b, 1);
   const auto total = [&] {
     double sum = 0;
-    for (const auto& c : set.chains()) sum += c.weight;
+    for (const auto& c : chains_of(set.seen())) sum += c.weight;
     return sum;
   };
   const double hits_a = [&] {
@@ -306,6 +307,51 @@ TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
   EXPECT_FALSE(set.expire(1099));
   EXPECT_TRUE(set.expire(1100));
   EXPECT_NEAR(total(), hits_b, 1e-3);
+}
+
+TEST(WorkingSet, KeepsAllThatWasGlancedAtOnTheWayButNotForEver) {
+  WorkingSetOptions options;
+  options.keep_previous = 1000;
+  WorkingSet set(options);
+  const auto glance = [&](std::uint32_t tile, Microseconds now) {
+    set.start_pose(now, kPassesPerPicture);
+    VisibleSet seen;
+    seen.add(Chain{{TileId(0, tile)}}, 1);
+    seen.add_samples(1);
+    set.add(seen, 0);
+  };
+  const auto tiles = [&] {
+    std::set<std::uint32_t> out;
+    for (const auto& c : chains_of(set.seen())) out.insert(c.chain.tiles[0].index());
+    return out;
+  };
+  for (std::uint32_t i = 0; i < 10; ++i) glance(i, 100 * i);
+  EXPECT_EQ(tiles().size(), 10u);
+  for (std::uint32_t i = 10; i < 100; ++i) {
+    glance(i, 100 * i);
+    const auto now = tiles();
+    for (std::uint32_t k = i - 9; k <= i; ++k) EXPECT_TRUE(now.contains(k)) << k;
+    EXPECT_LE(now.size(), 24u);
+  }
+  double weight = 0;
+  for (const auto& c : chains_of(set.seen())) weight += double(c.weight);
+  EXPECT_NEAR(weight, 1.25, 1e-4);
+  EXPECT_TRUE(set.expire(100 * 99 + 1000));
+  EXPECT_EQ(tiles(), std::set<std::uint32_t>{99});
+}
+
+TEST(Visibility, AGlanceFindsMostOfWhatAPassFindsWithFarFewerRays) {
+  const auto world = make_room();
+  const ViewSampler sampler(*world.layout, *world.rays, look_at({0.3, 0.4, 1.5}, {-0.6, -0.2, -8}, 55), {640, 360});
+  VisibleSet whole, glance;
+  trace_rows(sampler, 0, 0, block_rows({640, 360}), whole);
+  trace_rows(sampler, 0, 0, block_rows({640, 360}, 600), glance, {}, 600);
+  EXPECT_GT(glance.samples(), 500);
+  EXPECT_LT(glance.samples(), 700);
+  ChainIndex known;
+  for (const auto& chain : glance.chains()) known.insert(chain);
+  EXPECT_GT(known_share(whole, known), 0.65f) << "of a 24th of the rays";
+  EXPECT_LE(block_rows({640, 360}, 1) * block_columns({640, 360}, 1), 2u);
 }
 
 }  // namespace

@@ -1,0 +1,43 @@
+// What the members of a stream see, together. Pure.
+#pragma once
+
+#include "actors/tile_scheduler/seen.hpp"
+#include "actors/types/frame_stamps.hpp"
+
+namespace darm::tile_scheduler {
+
+/// Gathers what each member's looks bring, for about `keep`: few rays a look are enough where many look around. Each
+/// look of each member counts alike, whatever its size, so that no client buys more of a stream with a larger picture.
+/// Bounded by VisibleSet's limits, twice.
+class SharedSet {
+ public:
+  static constexpr Microseconds kKeep = 1'000'000;
+  /// What a look weighs that stands for a second of them, of a member that rests.
+  static constexpr float kRests = 10;
+  /// A hundred thousand would be measured in ten milliseconds; a few for each chain are enough.
+  static constexpr std::size_t kMaxTaps = 65536;
+
+  /// What a look has brought, of one view.
+  void add(const VisibleSet& samples, float looks = 1);
+  /// Somebody sees something else than before, or has gone.
+  void note_change() { changed_ = true; }
+  /// What is gathered holds things that nobody may see any more.
+  [[nodiscard]] bool stale(Microseconds now) const { return (changed_ || older_.samples() > 0) && now >= renew_at_; }
+  /// Sets apart what was gathered until now and forgets what was before. What members see now is to be added again. Not
+  /// stale again for kKeep, or ten times as long as renewing took (see renewed()).
+  void renew(Microseconds now);
+  /// That took until `now`.
+  void renewed(Microseconds began, Microseconds now);
+  void clear() { *this = SharedSet{}; }
+
+  /// Valid until the next change.
+  [[nodiscard]] Seen seen(bool rests) const;
+
+ private:
+  VisibleSet newest_;  // samples() are looks
+  VisibleSet older_;
+  bool changed_ = false;
+  Microseconds renew_at_ = 0;
+};
+
+}  // namespace darm::tile_scheduler
