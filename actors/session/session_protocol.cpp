@@ -277,8 +277,12 @@ void SessionProtocol::on_coarse(const CoarseUpdated& event) {
 
 void SessionProtocol::ask_for_keys(Microseconds now, Actions& actions) {
   if (state_ != State::kOpen) return;
-  for (const auto layer : {StreamLayer::kShared, StreamLayer::kView})
-    if (queue_.ask_for_key(now, layer)) actions.push_back(tile_scheduler::KeyFrameWanted(id_, layer));
+  for (const auto layer : {StreamLayer::kShared, StreamLayer::kView}) {
+    if (!queue_.ask_for_key(now, layer)) continue;
+    const auto dropped = queue_.pictures_dropped();
+    const bool behind = dropped > std::exchange(dropped_told_, dropped);
+    actions.push_back(tile_scheduler::KeyFrameWanted(id_, layer, behind));
+  }
 }
 
 Actions SessionProtocol::on_sent(Microseconds now) {

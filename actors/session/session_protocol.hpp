@@ -103,6 +103,7 @@ class SessionProtocol {
   std::shared_ptr<FrameBodies> bodies_;
   proto::FrameReader reader_;
   SendQueue queue_;
+  std::size_t dropped_told_ = 0;  // of its dropped pictures, the scheduler knows of so many
   State state_ = State::kAwaitHello;
   Microseconds started_;
   Microseconds heard_;

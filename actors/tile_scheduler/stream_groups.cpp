@@ -137,6 +137,11 @@ StreamId StreamGroups::put(SessionId session, const StreamFormat& format, std::v
     tally.remove(it->second.tiles);
     tally.add(tiles);
     it->second.tiles = std::move(tiles);
+    it->second.changes_to.reset();
+    if (!(groups_.at(it->second.stream).format == format)) {
+      it->second.changes_to = format;
+      formats_change_ = true;
+    }
     return it->second.stream;
   }
   const auto found = room_for(format, tiles, tiles.size(), StreamId{});
@@ -169,17 +174,27 @@ void StreamGroups::leave(SessionId session, const Member& member) {
   if (it->second.members.empty()) groups_.erase(it);
 }
 
-void StreamGroups::move(SessionId session, StreamId to, bool split, std::vector<GroupMove>& moves) {
+void StreamGroups::move(SessionId session, StreamId to, const StreamFormat& format, bool split,
+                        std::vector<GroupMove>& moves) {
   auto& member = members_.at(session);
-  const auto format = groups_.at(member.stream).format;
   leave(session, member);
   enter(session, member, to, format);
   moves.push_back({session, to, split});
   changed_ = true;
 }
 
+void StreamGroups::change_formats(std::vector<GroupMove>& moves) {
+  for (auto& [session, member] : members_) {
+    if (!member.changes_to) continue;
+    const auto format = *std::exchange(member.changes_to, std::nullopt);
+    const auto found = room_for(format, member.tiles, member.tiles.size(), member.stream);
+    move(session, found ? *found : new_stream_(), format, true, moves);
+  }
+}
+
 std::vector<GroupMove> StreamGroups::regroup(Microseconds now) {
   std::vector<GroupMove> moves;
+  if (std::exchange(formats_change_, false)) change_formats(moves);
   if (!options_.share) return moves;
   std::vector<StreamId> due;
   for (auto& [id, group] : groups_) {
@@ -219,7 +234,7 @@ void StreamGroups::split(StreamId stream, std::vector<GroupMove>& moves) {
     const auto tiles = together.tiles();
     const auto found = room_for(format, tiles, sets[clusters[c].front()].size(), stream);
     const auto to = found ? *found : new_stream_();
-    for (const auto i : clusters[c]) move(everybody[i], to, true, moves);
+    for (const auto i : clusters[c]) move(everybody[i], to, format, true, moves);
   }
 }
 
@@ -270,7 +285,8 @@ void StreamGroups::join(Microseconds now, std::vector<GroupMove>& moves) {
       const auto most = std::max(largest(group), largest(target));
       if (!within(size, slot_count(group.format), most, options_.join)) continue;
       const auto everybody = group.members;
-      for (const auto session : everybody) move(session, to, false, moves);
+      const auto format = group.format;
+      for (const auto session : everybody) move(session, to, format, false, moves);
     }
   }
 }

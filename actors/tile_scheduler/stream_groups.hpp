@@ -52,7 +52,8 @@ class StreamGroups {
   StreamGroups(GroupOptions options, std::function<StreamId()> new_stream);
 
   /// The working set of `session` is now `tiles` (distinct). One that is new joins at once the stream that lacks fewest
-  /// of its tiles, where the union fits with room, else it begins one.
+  /// of its tiles, where the union fits with room, else it begins one. One whose format is another than before goes to
+  /// a stream of that with the next regroup().
   StreamId put(SessionId session, const StreamFormat& format, std::vector<TileId> tiles);
   void remove(SessionId session);
   /// Who goes where, now; already done when this returns. Streams without members are gone.
@@ -70,6 +71,7 @@ class StreamGroups {
   struct Member {
     StreamId stream{};
     std::vector<TileId> tiles;
+    std::optional<StreamFormat> changes_to;
   };
   struct Group {
     StreamFormat format;
@@ -86,8 +88,9 @@ class StreamGroups {
                                                  std::size_t largest_of_them, StreamId but) const;
   void enter(SessionId session, Member& member, StreamId stream, const StreamFormat& format);
   void leave(SessionId session, const Member& member);
-  void move(SessionId session, StreamId to, bool split, std::vector<GroupMove>& moves);
+  void move(SessionId session, StreamId to, const StreamFormat& format, bool split, std::vector<GroupMove>& moves);
   void split(StreamId stream, std::vector<GroupMove>& moves);
+  void change_formats(std::vector<GroupMove>& moves);
   void plan_joins(Microseconds now);
   void plan_joins(std::span<const StreamId> alike, Microseconds now);
   void join(Microseconds now, std::vector<GroupMove>& moves);
@@ -97,6 +100,7 @@ class StreamGroups {
   std::map<SessionId, Member> members_;
   Groups groups_;
   bool changed_ = false;  // a set or an assignment, since joins were looked for
+  bool formats_change_ = false;
   std::optional<Microseconds> planned_at_;
 };
 

@@ -98,6 +98,7 @@ void TileSchedulerActor::on(KeyFrameWanted&& message) {
     return;
   }
   if (session->stream == nullptr) return;  // it begins with one
+  if (message.behind) note_behind(*session);
   force_key(*session->stream);
   if (session->stream->key_put_off)
     metrics_.count("darm_key_frames_put_off_total", 1);
@@ -172,6 +173,7 @@ void TileSchedulerActor::on(Tick&&) {
 void TileSchedulerActor::update(Session& session) {
   if (session.job && session.job->done()) finish_view(session);  // its ViewTraced found a full mailbox
   if (session.set.expire(now_us()) && session.stream) session.stream->unchosen = true;
+  if (session.behind_at && now_us() - *session.behind_at >= options_.keeps_up) set_apart(session, false);
   if (session.stream && session.ungrouped) group(session);
   if (session.view_layer && session.view_layer->expire(now_us())) session.view_unweighed = true;
   if (session.view_unweighed) reallocate_view(session);

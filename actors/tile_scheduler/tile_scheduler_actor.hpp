@@ -59,6 +59,10 @@ struct SchedulerOptions {
   /// Least time between key frames for those who come to a stream: whoever comes meanwhile shares the next.
   Microseconds join_interval = 300'000;
   GroupOptions groups;
+  /// A client that does not keep up for longer than this goes to a stream of such clients, because its key frames are
+  /// everybody's; it comes back when it has kept up for `keeps_up`.
+  Microseconds behind = 2'000'000;
+  Microseconds keeps_up = 60'000'000;
   /// Streams are shared by the tiles that make up so much of each view; coarser levels do for the rest.
   double significant = 0.98;
   /// A look of one of many that shows less than this share of what its stream's tiles were chosen for is answered when
@@ -122,13 +126,15 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool awaits_key = false;   // it came to the stream after that's last key frame
     bool unchosen = false;     // it sees what the stream's tiles have not been chosen for yet
     WorkingSet set;
-    Microseconds grouped_at = 0;       // when groups_ heard of its set
-    bool ungrouped = false;            // which has changed since then
-    std::optional<ViewAnswer> answer;  // due with the stream's next frame
-    std::optional<ViewChanged> view;   // newest camera
-    std::optional<ViewChanged> posed;  // the camera of the working set's pose
-    CameraSequence taken_up = 0;       // newest sequence that a trace or an answer includes
-    std::shared_ptr<ViewJob> job;      // under way
+    Microseconds grouped_at = 0;               // when groups_ heard of its set
+    bool ungrouped = false;                    // which has changed since then
+    std::optional<Microseconds> behind_since;  // it has not kept up, for the first time
+    std::optional<Microseconds> behind_at;     // and lately
+    std::optional<ViewAnswer> answer;          // due with the stream's next frame
+    std::optional<ViewChanged> view;           // newest camera
+    std::optional<ViewChanged> posed;          // the camera of the working set's pose
+    CameraSequence taken_up = 0;               // newest sequence that a trace or an answer includes
+    std::shared_ptr<ViewJob> job;              // under way
     Microseconds last_start = 0;
     std::optional<Microseconds> moved_at;  // its newest camera, looked at or not, was another than the one before
     int updates_waited = 0;
@@ -198,6 +204,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void place(Session& session);
   void enter(Session& session, StreamId id);
   void leave(Session& session);
+  void note_behind(Session& session);
+  void set_apart(Session& session, bool apart);
   void regroup();
   void settle(Stream& stream);
   void group(Session& session);

@@ -21,6 +21,7 @@ struct StreamFormat {
   bool lossless_rgb = false;
   std::uint32_t view_phystex = 0;  ///< of the private layer: 0 (none), 512 or 1024 (lossless: up to 2048)
   StreamLayer layer = StreamLayer::kShared;
+  bool apart = false;  ///< for clients that cannot keep up: they share with each other only
 
   bool operator==(const StreamFormat&) const = default;
   /// The format of light for everybody: sessions of one such format may share a stream.
@@ -78,7 +79,9 @@ struct KeyFrameWanted {
   static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
   SessionId session{};
   StreamLayer layer = StreamLayer::kShared;
-  explicit KeyFrameWanted(SessionId id, StreamLayer of = StreamLayer::kShared) : session(id), layer(of) {}
+  bool behind = false;  ///< pictures were dropped because the client does not keep up
+  explicit KeyFrameWanted(SessionId id, StreamLayer of = StreamLayer::kShared, bool is_behind = false)
+      : session(id), layer(of), behind(is_behind) {}
   [[nodiscard]] std::uint64_t key() const {
     return static_cast<std::uint64_t>(session) * 2 + (layer == StreamLayer::kView ? 1 : 0);
   }

@@ -66,6 +66,22 @@ void TileSchedulerActor::leave(Session& session) {
   metrics_.set("darm_streams", double(streams_.size()));
 }
 
+// It has lost pictures because it does not keep up; once may happen to anybody.
+void TileSchedulerActor::note_behind(Session& session) {
+  session.behind_at = now_us();
+  if (!session.behind_since) session.behind_since = now_us();
+  if (!session.format.apart && now_us() - *session.behind_since >= options_.behind) set_apart(session, true);
+}
+
+void TileSchedulerActor::set_apart(Session& session, bool apart) {
+  if (!apart) session.behind_since = session.behind_at = std::nullopt;
+  if (session.format.apart == apart) return;
+  session.format.apart = apart;
+  session.grouped_at = 0;
+  session.ungrouped = true;
+  metrics_.count(apart ? "darm_sessions_set_apart_total" : "darm_sessions_taken_back_total");
+}
+
 // Sessions go where groups_ has put them. Whoever goes keeps its picture until the key frame of the other stream is in.
 void TileSchedulerActor::regroup() {
   std::set<StreamId> touched;

@@ -48,6 +48,8 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_renderer_tiles_shaded_total", "Tiles that got samples"},
     {"darm_session_bytes_sent_total", "Bytes written to clients"},
     {"darm_session_events_total", "Faults and refusals of sessions, by what happened"},
+    {"darm_sessions_set_apart_total", "Sessions that did not keep up and went to a stream of such sessions"},
+    {"darm_sessions_taken_back_total", "Sessions that kept up again and came back"},
     {"darm_slots_used", "Slots of shared streams that hold a tile"},
     {"darm_store_bytes", "Bytes of the radiance store"},
     {"darm_store_refused_updates", "Updates that the store refused because it is full"},

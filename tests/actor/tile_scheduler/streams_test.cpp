@@ -190,6 +190,102 @@ TEST_F(SharedStreams, AStreamEndsWithItsLastMemberNotBefore) {
   EXPECT_TRUE(heard_.receivers[first_].empty());
 }
 
+TEST_F(SharedStreams, ClientsThatDoNotKeepUpGetAStreamApartAndTheOthersNoneOfTheirKeyFrames) {
+  both_look_ahead();
+  const auto falls_behind = [&](int updates) {
+    scheduler_.tell(KeyFrameWanted(bob_, StreamLayer::kShared, true));
+    system_.run_until_idle();
+    run(updates);
+  };
+  falls_behind(30);
+  EXPECT_EQ(heard_.encoders.size(), 1u) << "once may happen to anybody";
+  falls_behind(10);
+  ASSERT_EQ(heard_.encoders.size(), 2u);
+  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
+  const auto before = keys(first_);
+  for (int i = 0; i < 5; ++i) falls_behind(10);
+  EXPECT_EQ(keys(first_), before);
+  open(cid_);
+  look(cid_, 1, ahead_);
+  run(10);
+  EXPECT_EQ(heard_.receivers[first_], (std::vector<SessionId>{ann_, cid_}));
+  run(700);
+  EXPECT_EQ(heard_.receivers[first_], (std::vector<SessionId>{ann_, bob_, cid_})) << "it has kept up for a minute";
+  EXPECT_EQ(heard_.encoders, std::set<StreamId>{first_});
+}
+
+TEST_F(SharedStreams, NobodyWaitsForAFrameUnderWayAndAnswersComeInOrder) {
+  both_look_ahead();
+  look(ann_, 2, aside_);
+  for (int i = 0; i < 12 && heard_.frames[first_].back().answers.empty(); ++i) run(1);
+  look(bob_, 2, aside_);
+  run(30);
+  // A frame goes out and stays under way, and bob's camera does not wait for it.
+  scheduler_.tell(KeyFrameWanted(ann_));
+  system_.run_until_idle();
+  const auto frames = heard_.frames[first_].size();
+  look(bob_, 3, ahead_);
+  for (int i = 0; i < 5; ++i) tick();
+  EXPECT_EQ(heard_.frames[first_].size(), frames);
+  EXPECT_TRUE(answered(bob_).contains(3));
+  CameraSequence last = 0;
+  for (const auto& n : heard_.no_changes) {
+    if (n.answer.session != bob_) continue;
+    EXPECT_GT(n.answer.sequence, last);
+    last = n.answer.sequence;
+  }
+}
+
+// Twenty who walk side by side.
+class Crowd : public SharedStreams {
+ protected:
+  static constexpr std::uint64_t kMany = 20;
+  void SetUp() override {
+    for (std::uint64_t i = 1; i <= kMany; ++i) {
+      open(SessionId{i}, 2048, 0);
+      look(SessionId{i}, 1, at(i, 0));
+      run(1);
+    }
+    run(20);
+    ASSERT_EQ(heard_.encoders.size(), 1u);
+    system_.clear_log();
+  }
+  static Camera at(std::uint64_t who, int step) {
+    const double x = 0.002 * static_cast<double>(who), z = 1.5 - 0.004 * step;
+    return look_at({x, 0.4, z}, {-0.6 + x, -0.2, z - 9.5}, 55);
+  }
+  std::size_t looks() {
+    std::size_t n = 0;
+    for (const auto& handled : system_.messages_log()) n += handled.message == "ViewTraced" ? 1 : 0;
+    return n;
+  }
+};
+
+TEST_F(Crowd, EachLooksForItselfNowAndThenAndIsAnsweredEachTime) {
+  constexpr int kSteps = 30;
+  for (int step = 1; step <= kSteps; ++step) {
+    for (std::uint64_t i = 1; i <= kMany; ++i) look(SessionId{i}, static_cast<CameraSequence>(step + 1), at(i, step));
+    run(1);
+  }
+  run(3);
+  EXPECT_LE(looks(), kMany * kSteps / 2);
+  EXPECT_GE(looks(), kMany * kSteps / 10) << "but each does look";
+  for (std::uint64_t i = 1; i <= kMany; ++i) EXPECT_TRUE(answered(SessionId{i}).contains(kSteps + 1)) << i;
+  std::size_t answers = 0;
+  for (std::uint64_t i = 1; i <= kMany; ++i) answers += answered(SessionId{i}).size();
+  EXPECT_GE(answers, kMany * kSteps * 9 / 10);
+}
+
+TEST_F(Crowd, WhoJumpsElsewhereIsLookedForAtOnce) {
+  look(SessionId{7}, 2, at(7, 1));
+  run(1);
+  const auto before = looks();
+  look(SessionId{7}, 3, aside_);
+  run(2);
+  EXPECT_GT(looks(), before);
+  EXPECT_TRUE(answered(SessionId{7}).contains(3));
+}
+
 // Two different views do not fit together.
 class CrowdedStreams : public SharedStreams {
  protected:

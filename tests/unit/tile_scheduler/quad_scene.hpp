@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <vector>
@@ -46,6 +47,10 @@ inline TestWorld make_world(const std::vector<Quad>& quads, float q, int levels)
     const glm::vec3 r = quad.right * quad.width;
     const glm::vec3 u = quad.up * quad.height;
     mesh.positions = {quad.origin, quad.origin + r, quad.origin + r + u, quad.origin + u};
+    for (const auto& corner : mesh.positions) {
+      scene->bounds_min = glm::min(scene->bounds_min, corner);
+      scene->bounds_max = glm::max(scene->bounds_max, corner);
+    }
     mesh.normals.assign(4, glm::cross(quad.right, quad.up));
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
     mesh.material = number;

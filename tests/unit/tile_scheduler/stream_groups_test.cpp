@@ -27,7 +27,6 @@ std::vector<TileId> tiles(std::uint32_t first, std::uint32_t count) {
 
 SessionId session(std::size_t number) { return SessionId{number + 1}; }
 
-// 100 slots unless a test says otherwise.
 // Times that the tests below count on.
 GroupOptions timed() {
   GroupOptions options;
@@ -36,6 +35,7 @@ GroupOptions timed() {
   return options;
 }
 
+// 100 slots unless a test says otherwise.
 class StreamGroupsTest : public ::testing::Test {
  protected:
   StreamId put(std::size_t who, std::vector<TileId> set, const StreamFormat& f = format()) {
@@ -69,6 +69,24 @@ TEST_F(StreamGroupsTest, WhoDoesNotFitWithRoomBeginsAStream) {
   const auto first = put(0, tiles(0, 60));
   EXPECT_NE(put(1, tiles(26, 60)), first) << "86 of 100 slots";
   EXPECT_EQ(put(2, tiles(25, 60)), at(1)) << "where fewest tiles are missing";
+}
+
+TEST_F(StreamGroupsTest, WhoIsSetApartSharesWithOthersThatAreAndComesBack) {
+  for (std::size_t i = 0; i < 4; ++i) put(i, tiles(0, 50));
+  const auto together = at(0);
+  auto apart = format();
+  apart.apart = true;
+  put(1, tiles(0, 50), apart);
+  put(3, tiles(0, 50), apart);
+  EXPECT_EQ(at(1), together) << "until streams are looked at";
+  const auto moves = groups_.regroup(now_);
+  ASSERT_EQ(moves.size(), 2u);
+  EXPECT_EQ(at(1), at(3));
+  EXPECT_NE(at(1), together);
+  EXPECT_EQ(groups_.members(together), (std::vector<SessionId>{session(0), session(2)}));
+  EXPECT_TRUE(wait(10 * kSecond).empty()) << "the two do not join";
+  put(1, tiles(0, 50));
+  EXPECT_EQ(groups_.regroup(now_), (std::vector<GroupMove>{{session(1), together, true}}));
 }
 
 TEST_F(StreamGroupsTest, FormatsAreNotMixed) {
