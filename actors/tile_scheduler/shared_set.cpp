@@ -18,8 +18,8 @@ void SharedSet::renew(Microseconds now) {
   newest_.reserve(older_.chains().size(), older_.tiles().size());
 }
 
-void SharedSet::renewed(Microseconds began, Microseconds now) {
-  renew_at_ = std::max(renew_at_, now + 10 * (now - began));
+void SharedSet::renewed(Microseconds took, Microseconds now) {
+  renew_at_ = std::max(renew_at_, now + std::min(10 * took, kLongestKeep));
 }
 
 Seen SharedSet::seen(bool rests) const {

@@ -12,6 +12,7 @@ namespace darm::tile_scheduler {
 class SharedSet {
  public:
   static constexpr Microseconds kKeep = 1'000'000;
+  static constexpr Microseconds kLongestKeep = 5'000'000;
   /// What a look weighs that stands for a second of them, of a member that rests.
   static constexpr float kRests = 10;
   /// A hundred thousand would be measured in ten milliseconds; a few for each chain are enough.
@@ -24,10 +25,10 @@ class SharedSet {
   /// What is gathered holds things that nobody may see any more.
   [[nodiscard]] bool stale(Microseconds now) const { return (changed_ || older_.samples() > 0) && now >= renew_at_; }
   /// Sets apart what was gathered until now and forgets what was before. What members see now is to be added again. Not
-  /// stale again for kKeep, or ten times as long as renewing took (see renewed()).
+  /// stale again for kKeep, or ten times as long as renewing took (see renewed()), kLongestKeep at most.
   void renew(Microseconds now);
-  /// That took until `now`.
-  void renewed(Microseconds began, Microseconds now);
+  /// That took so much processor time.
+  void renewed(Microseconds took, Microseconds now);
   void clear() { *this = SharedSet{}; }
 
   /// Valid until the next change.

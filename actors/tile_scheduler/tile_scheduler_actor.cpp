@@ -76,7 +76,7 @@ void TileSchedulerActor::on(SessionClosed&& message) {
   leave(*it->second);
   sessions_.erase(it);
   if (const auto left = streams_.find(stream); left != streams_.end()) settle(*left->second);
-  send_work();  // what only this session saw is no longer shaded
+  send_work_soon();  // what only this session saw is no longer shaded
 }
 
 void TileSchedulerActor::on(ViewChanged&& message) {
@@ -192,7 +192,7 @@ std::vector<TileSchedulerActor::Session*> TileSchedulerActor::by_last_look() {
 }
 
 void TileSchedulerActor::send_work() {
-  const auto started = now_us();
+  const auto started = executor().thread_time();
   work_changed_ = false;
   std::vector<const std::vector<renderer::TileRequest>*> views;
   for (const auto& [id, stream] : streams_) views.push_back(&stream->demand.requests);
@@ -201,7 +201,7 @@ void TileSchedulerActor::send_work() {
   for (const auto& [id, stream] : streams_)
     message.coarse.insert(message.coarse.end(), stream->demand.coarse.begin(), stream->demand.coarse.end());
   peers_->renderer().tell(std::move(message));
-  work_after_ = now_us() + (now_us() - started) * kWorkPause;
+  work_after_ = now_us() + (executor().thread_time() - started).count() * kWorkPause;
 }
 
 // Joining what many views ask for takes its time: then a later view's is sent together with those after it.

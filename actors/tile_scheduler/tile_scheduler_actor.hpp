@@ -3,6 +3,7 @@
 // tile_scheduler_streams.cpp, private layers in tile_scheduler_views.cpp.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -215,7 +216,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void choose(Stream& stream);
   void set_targets(Stream& stream) const;
   void grant(Stream& stream);
-  void note_chosen(Stream& stream, Microseconds started);
+  void note_chosen(Stream& stream, std::chrono::microseconds started);
   void force_key(Stream& stream);
   void admit(Stream& stream, Microseconds now);
   void compose(Stream& stream);

@@ -10,6 +10,7 @@ namespace darm::tile_scheduler {
 namespace {
 
 constexpr Microseconds kErrorEvery = 30'000;
+constexpr double kLongestUnchosenUs = 1e6;
 
 }  // namespace
 
@@ -85,7 +86,8 @@ void TileSchedulerActor::set_apart(Session& session, bool apart) {
 // Sessions go where groups_ has put them. Whoever goes keeps its picture until the key frame of the other stream is in.
 void TileSchedulerActor::regroup() {
   std::set<StreamId> touched;
-  for (const auto& move : groups_.regroup(now_us())) {
+  const auto started = now_us();
+  for (const auto& move : groups_.regroup(started)) {
     auto* session = find(move.session);
     if (session == nullptr || session->stream == nullptr || session->stream->id == move.to) continue;
     touched.insert(session->stream->id);
@@ -96,6 +98,7 @@ void TileSchedulerActor::regroup() {
   }
   for (const auto id : touched)
     if (const auto it = streams_.find(id); it != streams_.end()) settle(*it->second);
+  metrics_.observe("darm_regroup_seconds", double(now_us() - started) * 1e-6);
 }
 
 // Members have come or gone.
@@ -113,11 +116,13 @@ void TileSchedulerActor::note_seen(Session& session) {
 
 // Forgets what nobody has seen for a while. Of those who look at the very same picture one knows most.
 void TileSchedulerActor::gather(Stream& stream) {
-  const auto began = now_us();
-  stream.together.renew(began);
+  const auto began = executor().thread_time();
+  stream.together.renew(now_us());
   for (auto* member : stream.members)
     if (member->set.current().samples() > 0) note_seen(*member);
-  stream.together.renewed(began, now_us());
+  const auto took = (executor().thread_time() - began).count();
+  stream.together.renewed(took, now_us());
+  metrics_.observe("darm_stream_gather_seconds", double(took) * 1e-6);
 }
 
 void TileSchedulerActor::choose_if_due(Stream& stream) {
@@ -126,8 +131,8 @@ void TileSchedulerActor::choose_if_due(Stream& stream) {
 
 // Chooses slots for what the members see together, and what is shaded for them.
 void TileSchedulerActor::choose(Stream& stream) {
-  const auto started = now_us();
-  if (stream.shared() && stream.together.stale(started)) gather(stream);
+  const auto started = executor().thread_time();
+  if (stream.shared() && stream.together.stale(now_us())) gather(stream);
   const auto rests = [](const Session* member) { return member->set.passes() >= kTapPasses; };
   const auto seen = stream.shared() ? stream.together.seen(std::ranges::all_of(stream.members, rests))
                                     : stream.members.front()->set.seen();
@@ -157,18 +162,20 @@ void TileSchedulerActor::set_targets(Stream& stream) const {
         request.target_error = member->target_error;
 }
 
-// Choosing took so long, until now. It comes before light, so where there are several clients it must leave time.
-void TileSchedulerActor::note_chosen(Stream& stream, Microseconds started) {
-  const auto took = double(now_us() - started);
+// Choosing took the processor so long, until now. It comes before light, so where there are several clients it must
+// leave time.
+void TileSchedulerActor::note_chosen(Stream& stream, std::chrono::microseconds started) {
+  const auto took = double((executor().thread_time() - started).count());
   metrics_.observe("darm_allocation_seconds", took * 1e-6);
   if (sessions_.size() < 2) return;
-  stream.choose_after = now_us() + static_cast<Microseconds>(took * double(streams_.size()) / options_.weighing);
+  const double pause = std::min(took * double(streams_.size()) / options_.weighing, kLongestUnchosenUs);
+  stream.choose_after = now_us() + static_cast<Microseconds>(pause);
 }
 
 // Pictures have come: what can be had now?
 void TileSchedulerActor::grant(Stream& stream) {
-  const auto started = now_us();
-  if (started < stream.choose_after) return;
+  if (now_us() < stream.choose_after) return;
+  const auto started = executor().thread_time();
   stream.ungranted = false;
   grant_available(stream.demand, layout_->coarse_level(), stream.state.table(), images(), options_.allocation);
   note_chosen(stream, started);

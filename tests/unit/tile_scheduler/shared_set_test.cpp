@@ -141,10 +141,14 @@ TEST(SharedSet, RenewingThatTakesLongIsDoneLessOften) {
   SharedSet set;
   set.note_change();
   set.renew(0);
-  set.renewed(0, 400'000);
+  set.renewed(400'000, 0);
   set.note_change();
-  EXPECT_FALSE(set.stale(4'000'000));
-  EXPECT_TRUE(set.stale(4'400'000));
+  EXPECT_FALSE(set.stale(3'999'999));
+  EXPECT_TRUE(set.stale(4'000'000));
+  set.renew(4'000'000);
+  set.renewed(60'000'000, 4'000'000);
+  set.note_change();
+  EXPECT_TRUE(set.stale(9'000'000));
 }
 
 TEST(SharedSet, AnEmptyLookIsNoLook) {
