@@ -11,6 +11,7 @@
 #include "actors/renderer/view_renderer_actor.hpp"
 #include "actors/renderer/view_surface_scene.hpp"
 #include "actors/tile_scheduler/tile_scheduler_actor.hpp"
+#include "daemon/freed_memory.hpp"
 #include "daemon/late_ref.hpp"
 
 namespace darm {
@@ -97,8 +98,10 @@ tile_scheduler::Peers make_peers(const Wiring& w) {
                                                        std::move(receivers), scheduler->get(), metrics);
     return before ? before(format, encoder) : encoder;
   };
-  peers.destroy_encoder = [&system = w.system](StreamId, const runtime::Ref<encoder::Inbox>& encoder) {
+  peers.destroy_encoder = [&system = w.system, freed = std::make_shared<FreedMemory>()](
+                              StreamId, const runtime::Ref<encoder::Inbox>& encoder) {
     system.stop(encoder);
+    freed->give_back_soon(system.executor());
   };
   peers.set_receivers = [streams](StreamId stream, std::vector<SessionId> receivers) {
     streams->set(stream, std::move(receivers));
