@@ -74,6 +74,13 @@ bool CellBase::guarded(std::string_view message, const std::function<void()>& ac
 }
 
 void CellBase::run_turn() {
+  const auto began = host_->executor().thread_time();
+  take_turn();
+  const std::chrono::duration<double> took = host_->executor().thread_time() - began;
+  host_->metrics().count("darm_actor_processor_seconds_total", took.count(), {{"actor", kind_of(name_)}});
+}
+
+void CellBase::take_turn() {
   MetricSink& metrics = host_->metrics();
   const std::string_view kind = kind_of(name_);
   const int limit = host_->messages_per_turn();

@@ -76,6 +76,7 @@ class CellBase : public std::enable_shared_from_this<CellBase> {
  private:
   enum class Step { kStart, kMessage, kStop, kIdle };
   Step next_step();
+  void take_turn();
   bool guarded(std::string_view message, const std::function<void()>& action);
   void end();
 

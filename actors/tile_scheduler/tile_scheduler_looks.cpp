@@ -179,6 +179,7 @@ void TileSchedulerActor::finish_view(Session& session) {
   const auto job = std::exchange(session.job, nullptr);
   const auto traced = now_us();
   looking_.end(job->rays(), job->busy());
+  metrics_.count("darm_look_processor_seconds_total", double(job->busy()) * 1e-6);
   metrics_.observe("darm_view_trace_seconds", double(traced - job->answer.stamps.view_started) * 1e-6);
   const bool shared = session.stream && session.stream->shared();
   const int whole = passes_per_picture(session.posed->viewport);
