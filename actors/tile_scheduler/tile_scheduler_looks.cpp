@@ -8,6 +8,7 @@
 namespace darm::tile_scheduler {
 namespace {
 
+constexpr std::size_t kMany = 16;               // sessions; whole passes of all of them at once would take seconds
 constexpr int kMovingPeriods = 3;               // a view that has not moved for so many updates rests
 constexpr std::uint32_t kRaysPerSlice = 8'192;  // fewer are not worth a second thread
 
@@ -43,11 +44,11 @@ void TileSchedulerActor::count_moving() {
   }
 }
 
-// A pose that has only been glanced at is one of many: it waits for its passes as those do that only refine.
+// Where there are many, a pose that has only been glanced at waits for its passes as those do that only refine.
 int TileSchedulerActor::passes_due(Session& session, bool moved) {
   if (moved) return options_.passes_moving;
   const int done = session.set.passes();
-  const bool glanced = done == 0 && session.set.current().samples() > 0;
+  const bool glanced = sessions_.size() > kMany && session.set.current().samples() > 0;
   if ((glanced || done >= options_.passes_unlit) && !looking_.allows(now_us())) return 0;
   const bool lit = session.stream && session.stream->demand.lit >= options_.lit;
   if (!lit && done >= options_.passes_unlit && ++session.updates_waited < options_.updates_unlit) return 0;
