@@ -40,8 +40,8 @@ struct SchedulerOptions {
   /// Share of the pool's time that tracing visibility may take before passes of still views wait; those under
   /// `passes_unlit` never do.
   double looking = 0.15;
-  /// Of a stream of more members than this, each looks less often while it moves, down to once in `crowd_updates`: they
-  /// see much the same, and what they see is shared.
+  /// Of a stream of twice as many members as this, each looks less often while it moves, down to once in
+  /// `crowd_updates`: they see much the same, and what they see is shared.
   std::size_t crowd = 4;
   std::size_t crowd_updates = 5;
   double crowd_rays = 24'000;  ///< a second, for all of them together
@@ -163,7 +163,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     std::vector<Session*> members;  // by id
     SharedSet together;             // what they see, while there are several
     ViewDemand demand;              // as slots were chosen last
-    ChainIndex known;               // numbers of its chains, while there are several members
+    ChainIndex known;               // numbers of its chains
     Microseconds weighed_at = 0;    // when that was
     Microseconds choose_after = 0;  // the next time they are chosen, at the earliest
     bool unchosen = false;          // there is more to see

@@ -69,11 +69,10 @@ std::uint32_t TileSchedulerActor::rays_due(const Session& session, bool moved) {
 
 Microseconds TileSchedulerActor::look_interval(const Session& session) const {
   const std::size_t members = session.stream ? session.stream->members.size() : 1;
-  if (members <= options_.crowd) return period_;
-  const auto crowds = std::clamp<std::size_t>(members / std::max<std::size_t>(1, options_.crowd), 1,
-                                              std::max<std::size_t>(1, options_.crowd_updates));
+  const auto crowds = std::min(members / std::max<std::size_t>(1, options_.crowd), options_.crowd_updates);
+  if (crowds < 2) return period_;
   const auto turn = static_cast<Microseconds>(static_cast<std::uint64_t>(session.id) % 8);
-  return period_ * static_cast<Microseconds>(crowds) * (8 + turn) / 12;  // not all at once
+  return std::max(period_, period_ * static_cast<Microseconds>(crowds) * (8 + turn) / 12);  // not all at once
 }
 
 // With what the others bring, so many are enough for a stream whose members move.

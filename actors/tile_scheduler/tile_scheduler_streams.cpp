@@ -114,7 +114,7 @@ void TileSchedulerActor::note_seen(Session& session) {
   session.stream->together.add(session.set.current(), rests ? SharedSet::kRests : 1.0f);
 }
 
-// Forgets what nobody has seen for a while. Of those who look at the very same picture one knows most.
+// Forgets what nobody has seen for a while.
 void TileSchedulerActor::gather(Stream& stream) {
   const auto began = executor().thread_time();
   stream.together.renew(now_us());
@@ -138,8 +138,7 @@ void TileSchedulerActor::choose(Stream& stream) {
                                     : stream.members.front()->set.seen();
   stream.demand = demand_of(seen, *layout_, stream.state.table(), images(), coarse_.get(), options_.allocation);
   stream.known.clear();
-  if (stream.shared())
-    for (const auto& item : stream.demand.chains) stream.known.insert(item.chain);
+  for (const auto& item : stream.demand.chains) stream.known.insert(item.chain);
   set_targets(stream);
   for (const auto tile : stream.demand.target.tiles) images_.touch(tile);
   for (auto* member : stream.members) member->unchosen = false;
