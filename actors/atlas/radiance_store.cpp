@@ -169,6 +169,9 @@ Result<std::unique_ptr<RadianceStore>> RadianceStore::open(const std::filesystem
     store->file_ = -1;
   }
   if (auto ok = store->map(key, tiles_per_level, options); !ok) return std::unexpected(ok.error());
+  if (options.reserve_last_level) {
+    if (auto ok = store->reserve_last_level(); !ok) return std::unexpected(ok.error());
+  }
   return store;
 }
 
@@ -342,22 +345,52 @@ std::uint32_t RadianceStore::version(TileId tile) const {
   return b != nullptr ? b->version : 0;
 }
 
-Result<std::uint32_t> RadianceStore::allocate_block() {
+Result<void> RadianceStore::reserve_last_level() {
   const std::scoped_lock lock(allocation_);
-  if (!free_blocks_.empty()) {
-    const auto b = free_blocks_.back();
-    free_blocks_.pop_back();
-    return b;
-  }
-  if (next_block_ >= max_blocks_) return fail(path_.string() + ": full; raise the store's size limit");
-  const std::uint64_t needed = blocks_offset_ + (std::uint64_t{next_block_} + 1) * kBlockBytes;
-  if (needed > allocated_bytes_) {
-    const std::uint64_t to = std::min(allocated_bytes_ + kBlocksPerReserve * kBlockBytes, mapped_bytes_);
-    if (const int error = reserve_on_disk(file_, allocated_bytes_, to); error != 0)
-      return fail(path_.string() + ": cannot grow: " + reason_of(error));
+  for (std::uint64_t slot = level_start_[level_start_.size() - 2]; slot < level_start_.back(); ++slot)
+    reserved_left_ += entry(slot).load(std::memory_order_relaxed) == 0 ? 1 : 0;
+  const std::uint64_t more = reserved_left_ > free_blocks_.size() ? reserved_left_ - free_blocks_.size() : 0;
+  const std::uint64_t bytes = blocks_offset_ + (next_block_ + more) * kBlockBytes;
+  if (next_block_ + more > max_blocks_)
+    return fail(path_.string() + ": the coarse level alone takes " + std::to_string(bytes) +
+                " bytes; raise state.max_store_bytes to that or more");
+  if (auto ok = grow_for(next_block_ + more); !ok)
+    return fail(ok.error().message + " (" + std::to_string(bytes) +
+                " bytes for the coarse level); make room on the disk or give another --state-dir");
+  return {};
+}
+
+// The file then has room for so many blocks.
+Result<void> RadianceStore::grow_for(std::uint64_t blocks) {
+  const std::uint64_t needed = blocks_offset_ + blocks * kBlockBytes;
+  if (needed <= allocated_bytes_) return {};
+  const std::uint64_t ahead = std::max(needed, allocated_bytes_ + kBlocksPerReserve * kBlockBytes);
+  for (const std::uint64_t to :
+       {std::min(ahead, mapped_bytes_), needed}) {  // the last of a disk is taken piece by piece
+    if (const int error = reserve_on_disk(file_, allocated_bytes_, to); error != 0) {
+      if (to == needed) return fail(path_.string() + ": cannot grow: " + reason_of(error));
+      continue;
+    }
     allocated_bytes_ = to;
+    break;
   }
-  return next_block_++;
+  return {};
+}
+
+// `reserved`: for one of the tiles that reserved_left_ counts.
+Result<std::uint32_t> RadianceStore::allocate_block(bool reserved) {
+  const std::scoped_lock lock(allocation_);
+  const bool counted = reserved && reserved_left_ > 0;
+  const std::uint64_t kept = reserved_left_ - (counted ? 1 : 0);  // for others
+  const std::uint64_t free = free_blocks_.size();
+  const std::uint64_t more = kept + 1 > free ? kept + 1 - free : 0;  // blocks that are not there yet
+  if (next_block_ + more > max_blocks_) return fail(path_.string() + ": full; raise the store's size limit");
+  if (auto ok = grow_for(next_block_ + more); !ok) return std::unexpected(ok.error());
+  reserved_left_ = kept;
+  if (free == 0) return next_block_++;
+  const auto b = free_blocks_.back();
+  free_blocks_.pop_back();
+  return b;
 }
 
 Result<RadianceStore::Update> RadianceStore::begin_update(TileId tile) {
@@ -366,7 +399,7 @@ Result<RadianceStore::Update> RadianceStore::begin_update(TileId tile) {
   std::uint32_t e = entry(*slot).load(std::memory_order_acquire);
   bool empty = false;
   if (e == 0) {
-    auto fresh = allocate_block();
+    auto fresh = allocate_block(*slot >= level_start_[level_start_.size() - 2]);
     if (!fresh) {
       ++refused_full_;
       return std::unexpected(fresh.error());

@@ -111,6 +111,8 @@ struct StoreKey {
 struct StoreOptions {
   std::uint64_t max_bytes = std::uint64_t{16}
                             << 30;  ///< of the file; a tile takes 48 KiB. New tiles are refused beyond it
+  /// The last level always has room, on disk as well: what has none of its own is shown, and lit, from there.
+  bool reserve_last_level = false;
 };
 
 struct StoreCounters {
@@ -154,7 +156,8 @@ class RadianceStore {
 
   /// Opens `directory`/radiance-<key>.store, or makes it. `tiles_per_level`: 1..16 levels, 2^28 tiles in all at most.
   /// A file that is not this store (or whose header is damaged) is renamed to *.refused, a fresh one made, and the
-  /// reason kept in refused_reason(). Fails if the folder cannot be written, or another process has the store open.
+  /// reason kept in refused_reason(). Fails if the folder cannot be written, another process has the store open, or
+  /// there is no room for what is to be reserved.
   static Result<std::unique_ptr<RadianceStore>> open(const std::filesystem::path& directory, const StoreKey& key,
                                                      std::span<const std::uint32_t> tiles_per_level,
                                                      const StoreOptions& options = {});
@@ -207,7 +210,9 @@ class RadianceStore {
   /// Null if the tile has no light that can be trusted.
   [[nodiscard]] BlockHeader* trusted_block(TileId tile) const;
   [[nodiscard]] Trust trust_of(std::uint32_t block_index, TileId tile) const;
-  [[nodiscard]] Result<std::uint32_t> allocate_block();
+  [[nodiscard]] Result<void> reserve_last_level();
+  [[nodiscard]] Result<void> grow_for(std::uint64_t blocks);
+  [[nodiscard]] Result<std::uint32_t> allocate_block(bool reserved);
 
   std::filesystem::path path_;
   std::string refused_reason_;
@@ -219,7 +224,8 @@ class RadianceStore {
   std::uint32_t max_blocks_ = 0;
   mutable std::vector<std::atomic<Trust>> trust_;
 
-  std::mutex allocation_;              // guards the four below
+  std::mutex allocation_;              // guards the five below
+  std::uint64_t reserved_left_ = 0;    ///< tiles of the last level without a block, if they are reserved
   std::uint64_t allocated_bytes_ = 0;  ///< of the file, reserved on disk
   std::uint32_t next_block_ = 0;
   std::vector<std::uint32_t> free_blocks_;

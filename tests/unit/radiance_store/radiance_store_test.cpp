@@ -305,6 +305,32 @@ TEST_F(RadianceStoreTest, new_tiles_are_refused_at_the_size_limit_and_old_ones_g
   EXPECT_EQ(store->version(TileId(0, 2)), 2u);
 }
 
+TEST_F(RadianceStoreTest, a_reserved_last_level_has_room_whatever_the_others_take) {
+  const std::vector<std::uint32_t> tiles{50, 3};
+  const StoreOptions five{.max_bytes = 4096 * 2 + 5 * RadianceStore::kBlockBytes, .reserve_last_level = true};
+  for (int restart = 0; restart < 2; ++restart) {
+    auto store = RadianceStore::open(dir_, kKey, tiles, five);
+    ASSERT_TRUE(store) << store.error().message;
+    std::uint32_t taken = 0;
+    for (std::uint32_t i = 0; i < 10; ++i)
+      if ((*store)->begin_update(TileId(0, i))) ++taken;
+    EXPECT_EQ(taken, 2u);
+    if (restart == 0) put(**store, TileId(1, 1), 1.0f);
+  }
+  auto store = RadianceStore::open(dir_, kKey, tiles, five);
+  ASSERT_TRUE(store);
+  for (std::uint32_t i = 0; i < 3; ++i) put(**store, TileId(1, i), 1.0f);
+  EXPECT_EQ((*store)->counters().tiles, 5u);
+}
+
+TEST_F(RadianceStoreTest, a_limit_under_the_reserved_level_is_refused_with_the_way_out) {
+  const std::vector<std::uint32_t> tiles{50, 3};
+  const auto store = RadianceStore::open(
+      dir_, kKey, tiles, {.max_bytes = 4096 * 2 + 2 * RadianceStore::kBlockBytes, .reserve_last_level = true});
+  ASSERT_FALSE(store);
+  EXPECT_THAT(store.error().message, ::testing::HasSubstr("raise state.max_store_bytes"));
+}
+
 TEST_F(RadianceStoreTest, albedo_is_there_after_a_restart_and_starts_unknown) {
   TileAlbedo albedo;
   albedo.bits[7] = {65535, 1, 300};
