@@ -24,12 +24,12 @@ bool is_direction(const glm::vec3& v) {
   return std::isfinite(length) && length > 1e-12f;
 }
 
-/// A clear afternoon, in lux and nits; the ratio of sun to sky is what matters, exposure takes care of the rest.
-Sun default_sun() { return {glm::vec3(0.3f, -1.0f, 0.15f), glm::vec3(60000.0f, 56000.0f, 50000.0f), 0.53f}; }
-Sky default_sky() {
-  return {glm::vec3(2500.0f, 3600.0f, 6000.0f), glm::vec3(5000.0f, 5500.0f, 6000.0f),
-          glm::vec3(1500.0f, 1400.0f, 1200.0f)};
-}
+/// A clear afternoon, five thousand times dimmer than outside: a white surface then sends back about as much as a glTF
+/// material may emit (1), so that what its author made glow or unlit is on the display as bright as it was meant.
+Sun default_sun() { return {glm::vec3(0.3f, -1.0f, 0.15f), glm::vec3(12.0f, 11.2f, 10.0f), 0.53f}; }
+Sky default_sky() { return {glm::vec3(0.5f, 0.72f, 1.2f), glm::vec3(1.0f, 1.1f, 1.2f), glm::vec3(0.3f, 0.28f, 0.24f)}; }
+/// Goes into the scene's hash where they may be used: light that was stored under others is not taken up.
+constexpr std::uint32_t kDefaultLightVersion = 2;
 
 std::uint32_t add_object(Scene& scene, std::string name) {
   scene.objects.push_back({std::move(name), false});
@@ -46,11 +46,18 @@ void add_sun(Scene& scene, const Sun& sun) {
   scene.lights.push_back(light);
 }
 
-bool has_emissive_surface(const Scene& scene) {
+// Some surface lights the others. glTF's own range of emission ends at 1, white on a display, and is for screens, dials
+// and signs; a lamp says more, by KHR_materials_emissive_strength.
+bool has_lamp_surface(const Scene& scene) {
   return std::ranges::any_of(scene.instances, [&](const Instance& i) {
     const Material& m = scene.materials[scene.meshes[i.mesh].material];
-    return m.emits() || m.unlit;
+    return !m.unlit && std::max({m.emissive.x, m.emissive.y, m.emissive.z}) > 1.0f;
   });
+}
+
+bool reflects_light(const Scene& scene) {
+  return std::ranges::any_of(scene.instances,
+                             [&](const Instance& i) { return !scene.materials[scene.meshes[i.mesh].material].unlit; });
 }
 
 Result<void> check_light(const Light& light, std::size_t index) {
@@ -99,7 +106,7 @@ Result<void> check_setup(const LightSetup& setup) {
 }
 
 void apply_setup(Scene& scene, const LightSetup& setup) {
-  if (setup.empty() && scene.lights.empty() && !has_emissive_surface(scene)) {
+  if (setup.empty() && scene.lights.empty() && !has_lamp_surface(scene) && reflects_light(scene)) {
     add_sun(scene, default_sun());
     scene.sky = default_sky();
     return;
@@ -119,6 +126,7 @@ void apply_setup(Scene& scene, const LightSetup& setup) {
 std::uint64_t hash_setup(const LightSetup& setup, std::uint64_t seed) {
   Hasher hash(seed);
   hash.add(setup.keep_file_lights);
+  if (setup.empty()) hash.add(kDefaultLightVersion);
   hash.add(setup.sun.has_value());
   if (setup.sun) {
     hash.add(setup.sun->direction);

@@ -10,8 +10,8 @@ namespace darm::scene {
 /// Errors name the key at fault: non-finite or negative radiance, a sun without direction, too wide a disc.
 Result<void> check_setup(const LightSetup& setup);
 
-/// Adds the setup's sun, sky and lights to a scene whose geometry, origin and file lights are final; without any light,
-/// emissive material or setup, a default sun and sky.
+/// Adds the setup's sun, sky and lights to a scene whose geometry, origin and file lights are final. Without a setup,
+/// without lights in the file and surfaces that emit more than 1 nit, a default sun and sky (unless all is unlit).
 void apply_setup(Scene& scene, const LightSetup& setup);
 
 /// Hash of the setup's values, chained onto `seed`.

@@ -29,6 +29,22 @@ TEST(GltfLoader, GivesALightlessSceneSunAndSky) {
   EXPECT_LT((*s)->lights[0].object, (*s)->objects.size());
 }
 
+// glTF's own emission ends at 1, white on a display: a dial is no lamp. What is stronger says so by its extension.
+TEST(GltfLoader, GivesASceneThatOnlyGlowsSunAndSkyButNotOneWithALampSurface) {
+  const auto with_material = [](const std::string& material) {
+    SmallScene s;
+    s.primitive += R"(,"material":0)";
+    s.more_members = R"(,"materials":[)" + material + "]";
+    return load(s).value();
+  };
+  EXPECT_TRUE(with_material(R"({"emissiveFactor":[1,1,1]})")->sky.emits());
+  const auto lamp = with_material(
+      R"({"emissiveFactor":[0,1,0],"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":2}}})");
+  EXPECT_FALSE(lamp->sky.emits());
+  EXPECT_TRUE(lamp->lights.empty());
+  EXPECT_TRUE(with_material(R"({"extensions":{"KHR_materials_unlit":{}}})")->lights.empty()) << "nothing takes light";
+}
+
 TEST(GltfLoader, TakesConfiguredLightInsteadOfTheDefault) {
   LightSetup setup;
   setup.sky = Sky{glm::vec3(1), glm::vec3(1), glm::vec3(1)};
