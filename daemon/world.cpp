@@ -9,7 +9,9 @@
 #include <thread>
 
 #include "actors/atlas/build_layout.hpp"
+#include "actors/renderer/coarse_coverage.hpp"
 #include "actors/renderer/exposure.hpp"
+#include "actors/renderer/tile_surface_scene.hpp"
 #include "daemon/scene_setup.hpp"
 
 namespace darm {
@@ -95,8 +97,9 @@ Result<World> load_world(const config::Config& config, unsigned threads) {
 
 Result<std::shared_ptr<atlas::RadianceStore>> open_store(const config::Config& config, const World& world,
                                                          const std::filesystem::path& folder) {
+  const atlas::StoreOptions options{.max_bytes = config.state.max_store_bytes, .reserve_last_level = true};
   auto store = atlas::RadianceStore::open(folder, {world.scene->hash, world.layout->hash, light_key(config)},
-                                          *world.layout, {config.state.max_store_bytes});
+                                          *world.layout, options);
   if (!store) return std::unexpected(store.error());
   return std::shared_ptr<atlas::RadianceStore>(std::move(*store));
 }
@@ -106,7 +109,12 @@ Result<World> build_world(const config::Config& config, unsigned threads) {
   if (!made) return made;
   World& world = *made;
   const auto start = Clock::now();
-  auto geometry = session::GeometryStream::build(*world.scene, *world.layout, world.exposure, threads);
+  const int coarse = world.layout->coarse_level();
+  const auto surfaces = renderer::make_scene_surfaces(world.scene, world.mapper, world.transport);
+  const auto coverage = renderer::coarse_coverage(
+      *world.scene, coarse, renderer::level_tiles_of(*world.layout)[static_cast<std::size_t>(coarse)], *surfaces,
+      threads);
+  auto geometry = session::GeometryStream::build(*world.scene, *world.layout, world.exposure, threads, coverage);
   if (!geometry) return std::unexpected(geometry.error());
   world.geometry = std::move(*geometry);
   spdlog::info("geometry: {} chunks, {:.2f} MB in {:.2f} s, exposure {:.4g}", world.geometry->chunk_count(),

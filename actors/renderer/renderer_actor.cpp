@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kPicturesPerSlice = 8;
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
-constexpr std::uint64_t kDisplayVersion = 4;
+constexpr std::uint64_t kDisplayVersion = 5;
 
 // What a stored picture depends on beside its light.
 std::uint64_t picture_tag_of(const DisplayOptions& display) {
@@ -236,8 +236,8 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
   }
   const LevelTiles level = shared.level_of(job.tile);
   const auto facts = shared.facts.get(job.tile, *shared.parts.surfaces, *shared.parts.store);
-  // CoarseTex has none; a tile of its level that gets a slot learns it then.
-  if (facts && !job.coarse) facts->learn_coverage(job.tile, level, *shared.parts.surfaces);
+  // Of the coarse level, too: its pictures are stored, and recalled for tiles that get a slot.
+  if (facts) facts->learn_coverage(job.tile, level, *shared.parts.surfaces);
   const float least = result.shading.progress.least;
   if (!facts || result.shading.progress.mean <= 0) return;
   TexelMask wanted = job.mask;

@@ -84,7 +84,8 @@ void put_instances(const scene::Scene& scene, const atlas::Layout& layout, wire:
     info->set_back_base(charts.back_base);
     info->set_flipped(instance.flipped);
     info->set_alpha_mode(static_cast<std::uint32_t>(material.alpha_mode));
-    info->set_alpha_cutoff(material.alpha_cutoff);
+    // Coverage is the share of a texel that passes the material's own cutoff: half of it is where the edge runs.
+    info->set_alpha_cutoff(0.5f);
     // Only a thin wall lets what is straight behind it through; volumes refract and are opaque tiles.
     info->set_transmission(material.thickness > 0 ? 0.0f : material.transmission);
     info->set_tint_rgb(pack_srgb(glm::vec3(material.base_color)));
@@ -207,7 +208,8 @@ GeometryStream::Box GeometryStream::box_of(const ChunkGeometry& g, const glm::ma
 
 Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene::Scene& scene,
                                                                     const atlas::Layout& layout, float exposure,
-                                                                    unsigned threads) {
+                                                                    unsigned threads,
+                                                                    std::span<const std::uint8_t> coarse_coverage) {
   if (auto ok = check(scene, layout, exposure); !ok) return std::unexpected(ok.error());
   auto stream = std::make_shared<GeometryStream>();
   stream->origin_ = scene.origin;
@@ -246,6 +248,10 @@ Result<std::shared_ptr<const GeometryStream>> GeometryStream::build(const scene:
   }
   m.set_q(layout.q);
   put_levels(layout, m);
+  if (!coarse_coverage.empty()) {
+    const auto packed = deflate(coarse_coverage, Effort::kOnceAScene);
+    m.set_coarse_coverage(packed.data(), packed.size());
+  }
   put_instances(scene, layout, m);
   m.set_chart_count(static_cast<std::uint32_t>(layout.charts.size()));
   m.set_geometry_chunks(static_cast<std::uint32_t>(pieces.size()));

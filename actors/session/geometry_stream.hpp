@@ -6,6 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "actors/atlas/layout.hpp"
@@ -21,9 +22,10 @@ namespace darm::session {
 class GeometryStream {
  public:
   /// `exposure`: of DESIGN section 4, finite and > 0. `threads`: at least 1. Triangles without texels are left out.
-  [[nodiscard]] static Result<std::shared_ptr<const GeometryStream>> build(const scene::Scene& scene,
-                                                                           const atlas::Layout& layout, float exposure,
-                                                                           unsigned threads);
+  /// `coarse_coverage`: alpha of CoarseTex, one byte for each texel of the layout's last level; empty: opaque.
+  [[nodiscard]] static Result<std::shared_ptr<const GeometryStream>> build(
+      const scene::Scene& scene, const atlas::Layout& layout, float exposure, unsigned threads,
+      std::span<const std::uint8_t> coarse_coverage = {});
 
   [[nodiscard]] const SharedBytes& manifest() const { return manifest_; }
   /// SceneManifest.tag: not 0; equal for equal manifest and geometry alone (64 bits of hash).

@@ -76,7 +76,8 @@ struct GlesRenderer::State {
   Result<gles::Program*> use_program(const SceneModel& scene, const InstanceShape& instance, Pass pass, bool blend);
   Result<void> draw_item(const SceneModel& scene, const View& view, const Item& item, const glm::dmat4& to_clip,
                          Pass pass, bool blend, Faces faces);
-  Result<void> draw_clear_item(const SceneModel& scene, const View& view, const Item& item, const glm::dmat4& to_clip);
+  Result<void> draw_blended_item(const SceneModel& scene, const View& view, const Item& item,
+                                 const glm::dmat4& to_clip);
   gles::Program* current = nullptr;  // whose frame uniforms are set
   float samples_per_axis = 1;        // of a pixel, in what is drawn now
 };
@@ -147,6 +148,7 @@ Result<gles::Program*> GlesRenderer::State::surface(const SurfaceVariant& varian
   glUniform1i(program->at("u_view_cb"), kViewCbUnit);
   glUniform1i(program->at("u_view_cr"), kViewCrUnit);
   glUniform1i(program->at("u_through"), kThroughUnit);
+  glUniform1i(program->at("u_coarse_coverage"), kCoarseCoverageUnit);
   return &surfaces.emplace(variant.bits(), std::move(*program)).first->second;
 }
 
@@ -309,13 +311,19 @@ Result<void> GlesRenderer::State::draw_item(const SceneModel& scene, const View&
   return {};
 }
 
-// Far faces before near ones, each twice: what is behind is multiplied by what comes through, then their light is
-// added.
-Result<void> GlesRenderer::State::draw_clear_item(const SceneModel& scene, const View& view, const Item& item,
-                                                  const glm::dmat4& to_clip) {
-  const bool both = scene.instances()[item.instance].camera_sees_back;
+// Faces turned away before those turned here, so that a closed body's far side lies under its near one. With the
+// private layer each twice: what is behind is multiplied by what comes through, then their light is added.
+Result<void> GlesRenderer::State::draw_blended_item(const SceneModel& scene, const View& view, const Item& item,
+                                                    const glm::dmat4& to_clip) {
+  const auto& instance = scene.instances()[item.instance];
+  const bool clear = instance.transmission > 0 && textures.has_view();
   for (const Faces faces : {Faces::kBacks, Faces::kFronts}) {
-    if (faces == Faces::kBacks && !both) continue;
+    if (faces == Faces::kBacks && !instance.camera_sees_back) continue;
+    if (!clear) {
+      set_blending(instance);
+      if (auto ok = draw_item(scene, view, item, to_clip, Pass::kColour, true, faces); !ok) return ok;
+      continue;
+    }
     glBlendFunc(GL_ZERO, GL_SRC_COLOR);
     if (auto ok = draw_item(scene, view, item, to_clip, Pass::kThrough, true, faces); !ok) return ok;
     glBlendFunc(GL_SRC_ALPHA, GL_ONE);
@@ -332,10 +340,8 @@ Result<void> GlesRenderer::State::draw_items(const SceneModel& scene, const View
     const auto& instance = scene.instances()[item.instance];
     if (pass == Pass::kDepth && instance.alpha_mode == AlphaMode::kMask) continue;
     if (outside(scene.chunks()[item.chunk], to_clip * glm::dmat4(instance.to_world))) continue;
-    const bool clear = blend && pass == Pass::kColour && instance.transmission > 0 && textures.has_view();
-    if (blend && !clear) set_blending(instance);
-    auto ok = clear ? draw_clear_item(scene, view, item, to_clip)
-                    : draw_item(scene, view, item, to_clip, pass, blend, Faces::kAll);
+    auto ok = blend && pass == Pass::kColour ? draw_blended_item(scene, view, item, to_clip)
+                                             : draw_item(scene, view, item, to_clip, pass, blend, Faces::kAll);
     if (!ok) return ok;
   }
   return {};

@@ -87,8 +87,8 @@ Result<SceneModel> SceneModel::from_manifest(const wire::SceneManifest& manifest
   model.limits_ = limits;
   model.scene_hash_ = manifest.scene_hash();
   model.tag_ = manifest.tag();
-  for (const auto step : {&SceneModel::read_levels, &SceneModel::read_patches, &SceneModel::read_instances,
-                          &SceneModel::read_surroundings}) {
+  for (const auto step : {&SceneModel::read_levels, &SceneModel::read_patches, &SceneModel::read_coarse_coverage,
+                          &SceneModel::read_instances, &SceneModel::read_surroundings}) {
     if (auto read = (model.*step)(manifest); !read) return std::unexpected(read.error());
   }
   if (manifest.geometry_chunks() > limits.max_chunks) return fail("manifest: too many geometry chunks");
@@ -138,6 +138,16 @@ Result<void> SceneModel::read_patches(const wire::SceneManifest& manifest) {
       return fail("manifest: a patch lies outside its level");
     }
   }
+  return {};
+}
+
+Result<void> SceneModel::read_coarse_coverage(const wire::SceneManifest& manifest) {
+  const auto& packed = manifest.coarse_coverage();
+  if (packed.empty()) return {};
+  const std::uint64_t texels = std::uint64_t{levels_.back().width} * levels_.back().height;
+  auto bytes = texels <= proto::most_inflated(packed.size()) ? inflate(packed, texels) : std::nullopt;
+  if (!bytes || bytes->size() != texels) return fail("manifest: coverage of CoarseTex does not fit the last level");
+  coarse_coverage_ = std::move(*bytes);
   return {};
 }
 

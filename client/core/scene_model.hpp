@@ -109,6 +109,8 @@ class SceneModel {
   [[nodiscard]] const glm::vec3& high() const { return high_; }
   [[nodiscard]] const Background& background() const { return background_; }
   [[nodiscard]] bool has_alpha() const { return has_alpha_; }
+  /// Alpha of CoarseTex, a byte for each texel of the last level, row-major; empty: opaque.
+  [[nodiscard]] const std::string& coarse_coverage() const { return coarse_coverage_; }
   [[nodiscard]] bool has_clear() const { return has_clear_; }  ///< some surface shows what is behind it, tinted
   [[nodiscard]] std::uint64_t scene_hash() const { return scene_hash_; }
   [[nodiscard]] std::uint64_t tag() const { return tag_; }  ///< equal for equal manifest and geometry; 0: none
@@ -119,6 +121,7 @@ class SceneModel {
  private:
   [[nodiscard]] Result<void> read_levels(const wire::SceneManifest& manifest);
   [[nodiscard]] Result<void> read_patches(const wire::SceneManifest& manifest);
+  [[nodiscard]] Result<void> read_coarse_coverage(const wire::SceneManifest& manifest);
   [[nodiscard]] Result<void> read_instances(const wire::SceneManifest& manifest);
   [[nodiscard]] Result<void> read_surroundings(const wire::SceneManifest& manifest);
 
@@ -141,6 +144,7 @@ class SceneModel {
   glm::dvec3 origin_{0.0};
   glm::vec3 low_{0.0f}, high_{0.0f};
   Background background_;
+  std::string coarse_coverage_;
   bool has_alpha_ = false;
   bool has_clear_ = false;
 };

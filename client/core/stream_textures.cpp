@@ -62,7 +62,10 @@ Result<StreamTextures> StreamTextures::create(const SceneModel& scene, const Str
   const std::uint32_t page_rows = PageTable(scene.tile_count()).rows();
   if (page_rows > t.largest_) return fail("manifest: the page table is larger than a texture of this GL");
   t.shared_.make(page_rows, shape);
-  if (scene.has_alpha()) t.make_coverage();
+  if (scene.has_alpha()) {
+    t.make_coverage();
+    if (auto made = t.make_coarse_coverage(scene); !made) return std::unexpected(made.error());
+  }
   t.coarse_y_ = plane(1, 1);
   t.coarse_cb_ = plane(1, 1);
   t.coarse_cr_ = plane(1, 1);
@@ -124,6 +127,19 @@ void StreamTextures::make_coverage() {
   put(coverage_, 0, 0, size, size, GL_RED, GL_UNSIGNED_BYTE, full.data());
 }
 
+Result<void> StreamTextures::make_coarse_coverage(const SceneModel& scene) {
+  const auto& bytes = scene.coarse_coverage();
+  const std::uint8_t opaque = 255;
+  const auto& level = scene.levels().back();
+  const std::uint32_t width = bytes.empty() ? 1 : level.width;
+  const std::uint32_t height = bytes.empty() ? 1 : level.height;
+  if (width > largest_ || height > largest_) return fail("coarse texture: larger than a texture of this GL");
+  coarse_coverage_ = plane(width, height);
+  put(coarse_coverage_, 0, 0, width, height, GL_RED, GL_UNSIGNED_BYTE,
+      bytes.empty() ? static_cast<const void*>(&opaque) : bytes.data());
+  return {};
+}
+
 void StreamTextures::make_through() {
   const std::uint32_t size = view_.size;
   through_ = gles::make_texture(GL_RGB8, size, size, GL_LINEAR);
@@ -163,7 +179,7 @@ Result<void> StreamTextures::upload_view(const StreamNews& news, const SceneMode
 void StreamTextures::bind() const {
   const gles::Texture* textures[] = {&places_,   &shared_.pages, &shared_.y,  &shared_.cb, &shared_.cr,
                                      &coverage_, &coarse_y_,     &coarse_cb_, &coarse_cr_, &view_.pages,
-                                     &view_.y,   &view_.cb,      &view_.cr,   &through_};
+                                     &view_.y,   &view_.cb,      &view_.cr,   &through_,   &coarse_coverage_};
   GLenum unit = GL_TEXTURE0;
   for (const auto* texture : textures) {
     glActiveTexture(unit++);

@@ -23,7 +23,8 @@ enum TextureUnit : int {
   kViewYUnit,
   kViewCbUnit,
   kViewCrUnit,
-  kThroughUnit
+  kThroughUnit,
+  kCoarseCoverageUnit
 };
 
 /// Needs the GL context current at every call.
@@ -52,13 +53,14 @@ class StreamTextures {
     void put_picture(const Picture& picture);
   };
   void make_coverage();
+  [[nodiscard]] Result<void> make_coarse_coverage(const SceneModel& scene);
   void make_through();
   [[nodiscard]] Result<void> upload_coarse(const Picture& picture);
 
   StreamShape shape_;
   std::uint32_t coarse_width_ = 0, coarse_height_ = 0, largest_ = 0;
   Slots shared_, view_;
-  gles::Texture places_, coverage_, coarse_y_, coarse_cb_, coarse_cr_, through_;
+  gles::Texture places_, coverage_, coarse_y_, coarse_cb_, coarse_cr_, through_, coarse_coverage_;
 };
 
 }  // namespace darm::client

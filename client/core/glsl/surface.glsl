@@ -73,6 +73,7 @@ void main() {
   vec2 corner = vec2(0.0), at = vec2(0.0);
   float coverage = 1.0;
   float source = 0.0;
+  bool in_slot = false;
   for (int k = 0; k < 4; ++k) {
     int l = level + k;
     if (l >= u_level_count) break;
@@ -82,15 +83,22 @@ void main() {
     coverage = textureLod(u_coverage, (corner + at) / u_phys_size, 0.0).r;
 #endif
     source = k == 0 ? 1.0 : 2.0;
+    in_slot = true;
     break;
   }
-  if (source == 0.0 && u_coarse_size.x > 0.0) {
+  if (!in_slot && u_coarse_size.x > 0.0) {
     int last = u_level_count - 1;
     vec2 where = texel_of(patch_id, last) / u_coarse_size;
     light = to_rgb(textureLod(u_coarse_y, where, 0.0).r, textureLod(u_coarse_cb, where, 0.0).r,
                    textureLod(u_coarse_cr, where, 0.0).r);
     source = level == last ? 1.0 : 3.0;
   }
+#if defined(MASK) || defined(BLEND)
+  // No slot says it; before the first light either.
+  if (!in_slot)
+    coverage = textureLod(u_coarse_coverage,
+                          texel_of(patch_id, u_level_count - 1) / vec2(textureSize(u_coarse_coverage, 0)), 0.0).r;
+#endif
 #ifdef MASK
   if (coverage < u_cutoff) discard;
   coverage = 1.0;

@@ -41,6 +41,7 @@ uniform sampler2D u_through;
 uniform vec3 u_tint;           // passed where no private tile says better
 #endif
 uniform sampler2D u_coverage;
+uniform sampler2D u_coarse_coverage;
 uniform sampler2D u_coarse_y;
 uniform sampler2D u_coarse_cb;
 uniform sampler2D u_coarse_cr;

@@ -43,6 +43,10 @@ test('a manifest is read, its levels follow each other in the page table', () =>
   assert.deepEqual(scene.origin, [1, 2, 3]);
   assert.equal(scene.instances[0]!.transmission, 1);
   assert.ok(scene.hasClear && !scene.hasAlpha);
+  assert.equal(scene.coarseCoverage, null);
+  const cut = manifest();
+  cut.coarseCoverage = pack(new Uint8Array(900).fill(9));
+  assert.deepEqual(readManifest(cut).coarseCoverage, new Uint8Array(900).fill(9));
 });
 
 test('a manifest that contradicts itself is refused', () => {
@@ -53,7 +57,8 @@ test('a manifest that contradicts itself is refused', () => {
     (m) => (m.instances[0]!.chart = 1), (m) => (m.instances[0]!.toWorld[5] = NaN), (m) => (m.instances[0]!.toWorld = []),
     (m) => (m.instances[0]!.frontBase = 2), (m) => (m.instances[0]!.backBase = 7), (m) => (m.instances[0]!.alphaMode = 3),
     (m) => (m.instances[0]!.f0 = NaN), (m) => (m.sun = [1, 2, 3]), (m) => (m.sun = [0, 0, 0, 1, 1, 1, 1]),
-    (m) => (m.geometryChunks = 2 ** 31), (m) => (m.origin!.x = Infinity),
+    (m) => (m.coarseCoverage = new Uint8Array(3)), (m) => (m.coarseCoverage = pack(new Uint8Array(899))),
+    (m) => (m.coarseCoverage = pack(new Uint8Array(901))), (m) => (m.geometryChunks = 2 ** 31), (m) => (m.origin!.x = Infinity),
     (m) => (m.levels = Array.from({length: 17}, () => m.levels[0]!)),
   ];
   for (const fault of faults) {

@@ -38,11 +38,11 @@ class RendererGles : public ::testing::Test {
     context_ = std::move(*made);
   }
 
-  void build(const wire::SceneManifest& manifest) {
+  void build(const wire::SceneManifest& manifest, const wire::GeometryChunk& chunk = synthetic::square_chunk()) {
     auto scene = SceneModel::from_manifest(manifest);
     ASSERT_TRUE(scene) << scene.error().message;
     scene_.emplace(std::move(*scene));
-    const auto added = scene_->add_chunk(synthetic::square_chunk());
+    const auto added = scene_->add_chunk(chunk);
     ASSERT_TRUE(added) << added.error().message;
     const StreamShape shape{256, false, true};
     auto player = StreamPlayer::create(*scene_, shape);
@@ -320,6 +320,46 @@ TEST_F(RendererGles, CoverageCutsMaskedAndFadesBlendedSurfaces) {
       EXPECT_GT(c[0], 255 * linear_to_srgb(0.25f));
       EXPECT_LT(c[0], 255 * linear_to_srgb(0.25f + 0.75f * behind) + 4);
     }
+  }
+}
+
+// A tile that is cut away as a whole is seen by no ray, so it never gets a slot.
+TEST_F(RendererGles, WhatHasNoSlotIsCutByTheCoverageOfCoarseTex) {
+  for (const char alpha : {'\x00', '\xff'}) {
+    auto manifest = synthetic::manifest();
+    manifest.mutable_instances(0)->set_alpha_mode(1);
+    manifest.mutable_instances(0)->set_alpha_cutoff(0.5f);
+    manifest.set_coarse_coverage(synthetic::deflate(std::string(std::size_t{30} * 30, alpha)));
+    manifest.set_sky_rgb_horizon(0);
+    build(manifest);
+    const auto view = look_at({1, 1, 1}, {1, 1, 0}, 90, 64, 64);
+    const Image8 image = draw(view);  // nothing has come yet
+    const auto counts = renderer_->count_residency(*scene_, view);
+    ASSERT_TRUE(counts);
+    EXPECT_EQ(counts->background == counts->samples, alpha == 0) << "samples that show the sky: " << counts->background;
+  }
+}
+
+// Two sheets back to back, the one seen from its front nearer: in whatever order the file has them.
+TEST_F(RendererGles, TheFarSideOfABlendedBodyLiesUnderItsNearOne) {
+  for (const bool near_first : {false, true}) {
+    auto manifest = synthetic::manifest();
+    manifest.mutable_instances(0)->set_alpha_mode(2);
+    for (auto set : {&wire::SceneManifest::set_sky_rgb_zenith, &wire::SceneManifest::set_sky_rgb_horizon,
+                     &wire::SceneManifest::set_sky_rgb_ground})
+      (manifest.*set)(0);
+    build(manifest, synthetic::two_sheets(near_first));
+    auto frame = synthetic::key_frame(
+        [](std::uint32_t level, int x, int) {
+          const int half = static_cast<int>(synthetic::kOrigin[level]) + (static_cast<int>(synthetic::kQ) >> level);
+          return x < half ? Colour{255, 0, 0} : Colour{0, 0, 255};
+        },
+        0, 2);
+    for (auto& edit : *frame.mutable_page_edits()) edit.set_coverage(synthetic::deflate(std::string(1024, '\x80')));
+    apply(frame);
+    const Colour c = pixel(draw(look_at({1, 1, 3}, {1, 1, 0}, 5, 33, 33)), 16, 16);
+    EXPECT_NEAR(c[0], 255 * linear_to_srgb(0.5f), 3) << near_first;
+    EXPECT_NEAR(c[2], 255 * linear_to_srgb(0.25f), 3) << near_first;
   }
 }
 

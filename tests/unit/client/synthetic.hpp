@@ -99,6 +99,25 @@ inline wire::GeometryChunk square_chunk() {
   return c;
 }
 
+/// The square twice, back to back: its left half's texels at z = 0.5 towards +z, its right half's at z = -0.5 towards
+/// -z.
+inline wire::GeometryChunk two_sheets(bool near_first) {
+  std::vector<GridVertex> v;
+  for (const auto& [z, u] : {std::pair{2, 0}, {-2, 5}})
+    for (const auto& [x, y] : {std::pair{0, 0}, {8, 0}, {8, 8}, {0, 8}})
+      v.push_back({{x, y, z}, {u + x * 3 / 8, y}, 0});
+  const std::vector<std::uint32_t> near = {0, 1, 2, 0, 2, 3}, far = {4, 6, 5, 4, 7, 6};
+  std::vector<std::uint32_t> i = near_first ? near : far;
+  const auto& second = near_first ? far : near;
+  i.insert(i.end(), second.begin(), second.end());
+  wire::GeometryChunk c = square_chunk();
+  c.set_vertex_count(8);
+  c.set_index_count(12);
+  c.set_vertices(pack_vertices(v));
+  c.set_indices(pack_indices(i, 8));
+  return c;
+}
+
 using Colour = std::array<std::uint8_t, 3>;
 using Atlas = std::function<Colour(std::uint32_t level, int x, int y)>;
 

@@ -238,8 +238,10 @@ TEST(GeometryStream, the_manifest_describes_levels_patches_instances_and_sky) {
   scene.lights[0].angular_diameter = 0.01f;
   scene.materials[0].alpha_mode = scene::AlphaMode::kMask;
   scene.materials[0].double_sided = true;
-  const auto e = parse(GeometryStream::build(scene, layout, 2.0f, 1).value()->manifest());
+  const std::vector<std::uint8_t> coverage(1000, 7);
+  const auto e = parse(GeometryStream::build(scene, layout, 2.0f, 1, coverage).value()->manifest());
   const auto& m = e.manifest();
+  EXPECT_EQ(inflate(m.coarse_coverage()), std::string(1000, '\7'));
   EXPECT_EQ(m.scene_hash(), 42u);
   EXPECT_EQ(m.name(), "grid");
   EXPECT_DOUBLE_EQ(m.origin().y(), 6);
@@ -258,6 +260,7 @@ TEST(GeometryStream, the_manifest_describes_levels_patches_instances_and_sky) {
   EXPECT_EQ(m.instances(1).front_base(), 4u);
   EXPECT_EQ(m.instances(1).back_base(), 0xffffffffu);
   EXPECT_EQ(m.instances(0).alpha_mode(), 1u);
+  EXPECT_EQ(m.instances(0).alpha_cutoff(), 0.5f) << "coverage is the share that passes the material's own";
   EXPECT_TRUE(m.instances(0).camera_sees_back());
   EXPECT_TRUE(m.instances(0).dynamic());
   EXPECT_EQ(m.sky_rgb_zenith(), 0xffffffu);  // 0.5 nits at exposure 2 is white

@@ -41,7 +41,7 @@ void main() {
 
 /** Texture units the surface programs read from, by the sampler's name. */
 export const kUnits = ['u_places', 'u_pages', 'u_y', 'u_cb', 'u_cr', 'u_coverage', 'u_coarse_y', 'u_coarse_cb',
-  'u_coarse_cr', 'u_view_pages', 'u_view_y', 'u_view_cb', 'u_view_cr', 'u_through'] as const;
+  'u_coarse_cr', 'u_view_pages', 'u_view_y', 'u_view_cb', 'u_view_cr', 'u_through', 'u_coarse_coverage'] as const;
 
 export class Programs {
   private readonly surfaces = new Map<string, Program>();

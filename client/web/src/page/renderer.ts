@@ -204,21 +204,23 @@ export class Renderer {
     this.current = null;
     for (const item of items) {
       if (pass === 'depth' && item.instance.alphaMode === 'mask') continue;
-      const clear = blend && pass === 'colour' && item.instance.transmission > 0 && this.textures.hasView;
-      if (clear) {
-        this.drawClearItem(frame, item);
-      } else {
-        if (blend) this.setBlending(item.instance);
-        this.drawItem(frame, item, pass, blend, 'all');
-      }
+      if (blend && pass === 'colour') this.drawBlendedItem(frame, item);
+      else this.drawItem(frame, item, pass, blend, 'all');
     }
   }
 
-  // Far faces before near ones, each twice: what is behind is multiplied by what comes through, then their light is added.
-  private drawClearItem(frame: Frame, item: Item): void {
+  // Faces turned away before those turned here, so that a closed body's far side lies under its near one. With the private
+  // layer each twice: what is behind is multiplied by what comes through, then their light is added.
+  private drawBlendedItem(frame: Frame, item: Item): void {
     const gl = this.gl;
+    const clear = item.instance.transmission > 0 && this.textures.hasView;
     for (const faces of ['backs', 'fronts'] as const) {
       if (faces === 'backs' && !item.instance.cameraSeesBack) continue;
+      if (!clear) {
+        this.setBlending(item.instance);
+        this.drawItem(frame, item, 'colour', true, faces);
+        continue;
+      }
       gl.blendFunc(gl.ZERO, gl.SRC_COLOR);
       this.drawItem(frame, item, 'through', true, faces);
       gl.blendFunc(gl.SRC_ALPHA, gl.ONE);

@@ -9,8 +9,8 @@ function plane(gl: Gl, width: number, height: number): WebGLTexture {
   return makeTexture(gl, gl.R8, width, height, gl.LINEAR);
 }
 
-function putPlane(gl: Gl, texture: WebGLTexture, width: number, height: number, buffer: ArrayBuffer, at: number): void {
-  put(gl, texture, 0, 0, width, height, gl.RED, gl.UNSIGNED_BYTE, new Uint8Array(buffer, at, width * height));
+function putPlane(gl: Gl, texture: WebGLTexture, width: number, height: number, bytes: Uint8Array): void {
+  put(gl, texture, 0, 0, width, height, gl.RED, gl.UNSIGNED_BYTE, bytes);
 }
 
 /** Three planes of one picture. */
@@ -37,9 +37,9 @@ class PlaneTextures {
       this.height = p.height;
       this.chroma444 = p.chroma444;
     }
-    putPlane(gl, this.y, p.width, p.height, p.buffer, p.y);
-    putPlane(gl, this.cb!, cw, ch, p.buffer, p.cb);
-    putPlane(gl, this.cr!, cw, ch, p.buffer, p.cr);
+    putPlane(gl, this.y, p.width, p.height, new Uint8Array(p.buffer, p.y, p.width * p.height));
+    putPlane(gl, this.cb!, cw, ch, new Uint8Array(p.buffer, p.cb, cw * ch));
+    putPlane(gl, this.cr!, cw, ch, new Uint8Array(p.buffer, p.cr, cw * ch));
   }
 }
 
@@ -69,6 +69,7 @@ export class StreamTextures {
   private view: Slots | null = null;
   private coverage: WebGLTexture | null = null;
   private through: WebGLTexture | null = null;
+  private readonly coarseCoverage: WebGLTexture | null;
   private coverageSize = 0;
   private throughSize = 0;
   readonly coarse: PlaneTextures;
@@ -88,6 +89,7 @@ export class StreamTextures {
     put(gl, this.places, 0, 0, kTableWidth, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, texels);
     this.shared = new Slots(gl, this.pageRows);
     this.coarse = new PlaneTextures(gl);
+    this.coarseCoverage = scene.hasAlpha ? this.makeCoarseCoverage(largest) : null;
   }
 
   /** Sizes of the session's streams; what slots held before means nothing once its first frame comes. */
@@ -153,12 +155,24 @@ export class StreamTextures {
       u_cr: this.shared.planes.cr, u_coverage: this.coverage, u_coarse_y: this.coarse.y, u_coarse_cb: this.coarse.cb,
       u_coarse_cr: this.coarse.cr, u_view_pages: this.view?.pages ?? null, u_view_y: this.view?.planes.y ?? null,
       u_view_cb: this.view?.planes.cb ?? null, u_view_cr: this.view?.planes.cr ?? null, u_through: this.through,
+      u_coarse_coverage: this.coarseCoverage,
     };
     kUnits.forEach((name, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, textures[name]);
     });
     gl.activeTexture(gl.TEXTURE0);
+  }
+
+  private makeCoarseCoverage(largest: number): WebGLTexture {
+    const bytes = this.scene.coarseCoverage;
+    const last = this.scene.levels[this.scene.levels.length - 1]!;
+    const width = bytes === null ? 1 : last.width;
+    const height = bytes === null ? 1 : last.height;
+    if (Math.max(width, height) > largest) throw new Error('the scene is larger than a texture of this device');
+    const texture = plane(this.gl, width, height);
+    putPlane(this.gl, texture, width, height, bytes ?? new Uint8Array([255]));
+    return texture;
   }
 
   // A texture of one value everywhere, made anew where the size differs.

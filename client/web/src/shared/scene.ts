@@ -57,6 +57,8 @@ export interface SceneShape {
   chunkCount: number;
   background: Background;
   hasAlpha: boolean;
+  /** Alpha of CoarseTex, a byte for each texel of the last level; null: opaque. */
+  coarseCoverage: Uint8Array | null;
   hasClear: boolean;
 }
 

@@ -144,6 +144,15 @@ function readBackground(manifest: SceneManifest): Background {
   }};
 }
 
+function readCoarseCoverage(manifest: SceneManifest, last: LevelShape): Uint8Array | null {
+  const packed = manifest.coarseCoverage;
+  if (packed.length === 0) return null;
+  const texels = last.width * last.height;
+  const bytes = texels <= mostInflated(packed.length) ? inflate(packed, texels) : null;
+  check(bytes !== null && bytes.length === texels, 'manifest: coverage of CoarseTex does not fit the last level');
+  return bytes;
+}
+
 export function readManifest(manifest: SceneManifest): SceneShape {
   check(Number.isFinite(manifest.q) && manifest.q > 0, 'manifest: q is not a positive number');
   const levels = readLevels(manifest);
@@ -171,6 +180,7 @@ export function readManifest(manifest: SceneManifest): SceneShape {
     chunkCount: manifest.geometryChunks,
     background: readBackground(manifest),
     hasAlpha: instances.some((i) => i.alphaMode !== 'opaque'),
+    coarseCoverage: readCoarseCoverage(manifest, last),
     hasClear: instances.some((i) => i.transmission > 0),
   };
 }
