@@ -168,7 +168,9 @@ void EncoderActor::publish(Job& job) {
     if (own != job.command.answers.end()) answer = *own;
     const auto error = std::find_if(job.command.errors.begin(), job.command.errors.end(),
                                     [wanted = id](const ViewError& e) { return e.session == wanted; });
-    answer.error = error == job.command.errors.end() ? job.command.error : error->error;
+    const bool told = error != job.command.errors.end();
+    answer.error = told ? error->error : job.command.error;
+    answer.resolution_error = told ? error->resolution : 0.0f;
     answer.stamps.encode_started = job.started;
     answer.stamps.picture_composed = job.composed;
     answer.stamps.encoded = job.encoded;

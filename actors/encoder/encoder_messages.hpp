@@ -32,6 +32,7 @@ struct PageEdit {
 struct ViewError {
   SessionId session{};
   float error = 0;
+  float resolution = 0;  ///< ViewAnswer::resolution_error
 };
 
 /// Make one frame. At most one per stream is under way: the scheduler waits for FrameDone.

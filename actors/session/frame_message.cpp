@@ -69,6 +69,7 @@ Packet frame_packet(FrameBodies& bodies, const std::shared_ptr<const EncodedFram
   wire::StreamFrame own;
   own.set_answers(answer.sequence);
   own.set_error(answer.error);
+  own.set_resolution_error(answer.resolution_error);
   put_stamps(answer.stamps, *own.mutable_stamps());
   packet.tail.resize(own.ByteSizeLong());
   own.SerializeWithCachedSizesToArray(packet.tail.data());
@@ -90,6 +91,7 @@ wire::Envelope no_change_message(const NoChange& event) {
   auto* m = envelope.mutable_no_change();
   m->set_answers(event.answer.sequence);
   m->set_error(event.error);
+  m->set_resolution_error(event.answer.resolution_error);
   put_stamps(event.answer.stamps, *m->mutable_stamps());
   return envelope;
 }

@@ -217,6 +217,7 @@ void TileSchedulerActor::record_errors() {
   for (const auto& [id, session] : sessions_) {
     if (!session->posed) continue;
     metrics_.observe("darm_view_error", double(session->error));
+    metrics_.observe("darm_view_resolution_error", double(session->resolution_error));
     worst = std::max(worst, double(session->error));
     done += session->error <= session->target_error ? 1 : 0;
   }

@@ -121,7 +121,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     SessionId id{};
     StreamFormat format;
     float target_error = 0;
-    float error = 1;  // estimated, of the view as it was shown last
+    float error = 1;             // estimated, of the view's light as it was shown last
+    float resolution_error = 0;  // beside it, for want of finer texels than the atlas has
     std::optional<Microseconds> error_at;
     Stream* stream = nullptr;  // from its first look on
     bool awaits_key = false;   // it came to the stream after that's last key frame

@@ -244,7 +244,9 @@ void TileSchedulerActor::answer_meanwhile(Stream& stream) {
 
 void TileSchedulerActor::tell_no_change(const ViewAnswer& answer) {
   const auto* session = find(answer.session);
-  peers_->sessions->find(answer.session).tell(session::NoChange(answer, session ? session->error : 1.0f));
+  ViewAnswer full = answer;
+  full.resolution_error = session ? session->resolution_error : 0.0f;
+  peers_->sessions->find(answer.session).tell(session::NoChange(full, session ? session->error : 1.0f));
 }
 
 // An error takes a millisecond to know: where many share a stream, each of theirs is looked at less often.
@@ -260,9 +262,10 @@ std::vector<encoder::ViewError> TileSchedulerActor::errors_of(const Stream& stre
           stream.shared()
               ? view_error(member->set.current(), stream.known, demand, images(), layout_->coarse_level(), coarse)
               : view_error(demand.chains, demand.granted.served, images(), layout_->coarse_level(), coarse);
+      member->resolution_error = member->set.current().resolution_error();
       member->error_at = now;
     }
-    out.push_back({member->id, member->error});
+    out.push_back({member->id, member->error, member->resolution_error});
   }
   return out;
 }

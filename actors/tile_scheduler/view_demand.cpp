@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "actors/tile_scheduler/coarseness.hpp"
 #include "actors/tile_scheduler/falling_weight.hpp"
 #include "actors/tile_scheduler/visibility.hpp"
 
@@ -180,9 +181,7 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
 
 float view_error(std::span<const WeightedChain> chains, std::span<const std::uint8_t> served, const ImageLookup& images,
                  int coarse_level, bool has_coarse, const ErrorOptions& options) {
-  const auto too_coarse = [&](int levels) {
-    return double(options.coarser[static_cast<std::size_t>(std::clamp(levels, 0, 4))]);
-  };
+  const auto too_coarse = [](int levels) { return double{error_of_coarser(static_cast<float>(levels))}; };
   double sum = 0;
   double weight = 0;
   for (std::size_t c = 0; c < chains.size(); ++c) {

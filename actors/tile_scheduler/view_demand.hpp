@@ -56,15 +56,12 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
                      const AllocationOptions& options);
 
 struct ErrorOptions {
-  /// RMS display error of a sample drawn 0, 1, ... levels coarser than sharp, beside noise (measured in the nine
-  /// evaluation views at q = 64; the last for all further ones).
-  std::array<float, 5> coarser{0.0f, 0.016f, 0.025f, 0.033f, 0.045f};
   float unlit = 0.25f;  ///< of a sample that nothing serves yet
 };
 
 /// Estimated display error of the light a view has: RMS over its samples of the error of the tile that serves each and
-/// of how much coarser than sharp it is. `has_coarse`: CoarseTex serves what no tile does. 0..1. `served`: parallel to
-/// `chains`, as Allocation has it.
+/// of how much coarser than sharp it is (coarseness.hpp). `has_coarse`: CoarseTex serves what no tile does. 0..1.
+/// `served`: parallel to `chains`, as Allocation has it.
 [[nodiscard]] float view_error(std::span<const WeightedChain> chains, std::span<const std::uint8_t> served,
                                const ImageLookup& images, int coarse_level, bool has_coarse,
                                const ErrorOptions& options = {});

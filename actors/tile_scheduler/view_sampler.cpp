@@ -33,6 +33,8 @@ ViewSampler::ViewSampler(const atlas::Layout& layout, const renderer::trace::Ray
   right_ = camera.orientation * glm::vec3(pixel, 0, 0);
   down_ = camera.orientation * glm::vec3(0, -pixel, 0);
   corner_ = camera.orientation * glm::vec3(-0.5f * width * pixel, half_height, -1.0f);
+  const glm::vec3 extent = glm::max(glm::abs(rays.scene().bounds_min), glm::abs(rays.scene().bounds_max));
+  past_ = 1e-6f * std::max({extent.x, extent.y, extent.z, glm::length(origin_)});
 }
 
 int ViewSampler::trace(float x, float y, std::array<SurfaceSample, kMaxLayers>& out) const {
@@ -50,7 +52,7 @@ int ViewSampler::trace(float x, float y, std::array<SurfaceSample, kMaxLayers>& 
     const auto& material = *rays_.instance(hit.instance).material;
     const bool seen_through = material.alpha_mode == scene::AlphaMode::kBlend || material.transmission > 0;
     if (!seen_through && has_texels) break;
-    ray.tmin = hit.t * (1.0f + 1e-5f) + 1e-4f;  // past this surface, whatever the scale of the scene
+    ray.tmin = hit.t * (1.0f + 1e-5f) + past_;  // past this surface, whatever the scale of the scene
   }
   return count;
 }
@@ -87,7 +89,8 @@ bool ViewSampler::surface_of(const renderer::trace::Hit& hit, const glm::vec3& d
     out.uv_dx = out.uv_dy = glm::vec2(0.0f);
   }
   const auto footprint = footprint_of(out.uv_dx, out.uv_dy);
-  out.level = sharp_level(footprint.minor * layout_.q, layout_.coarse_level());
+  out.pixel_texels = footprint.minor * layout_.q;
+  out.level = sharp_level(out.pixel_texels, layout_.coarse_level());
   return true;
 }
 

@@ -21,8 +21,9 @@ inline constexpr float kMaxAnisotropy = 64.0f;
 struct SurfaceSample {
   PatchId patch = kNoPatch;
   std::uint32_t instance = 0;
-  int level = 0;               ///< sharp level
-  glm::vec2 uv{0.0f};          ///< position in the patch, world units
+  int level = 0;           ///< sharp level
+  float pixel_texels = 0;  ///< minor axis of a pixel's footprint, texels of level 0: under 1, a pixel wants finer ones
+  glm::vec2 uv{0.0f};      ///< position in the patch, world units
   glm::vec2 patch_size{0.0f};  ///< extent of the patch, world units
   glm::vec2 uv_dx{0.0f};       ///< change of uv per pixel to the right
   glm::vec2 uv_dy{0.0f};       ///< change of uv per pixel down
@@ -65,6 +66,7 @@ class ViewSampler {
   glm::vec3 corner_;  // direction through picture position (0, 0); not unit: linear in x and y
   glm::vec3 right_;   // its change per pixel to the right
   glm::vec3 down_;    // and down
+  float past_;        // a distance that rounding of a surface's position does not reach
 };
 
 }  // namespace darm::tile_scheduler

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "actors/tile_scheduler/coarseness.hpp"
 #include "actors/tile_scheduler/texel_taps.hpp"
 
 namespace darm::tile_scheduler {
@@ -105,6 +106,8 @@ void add_sample(const atlas::Layout& layout, const SurfaceSample& sample, float 
   const Chain chain = chain_of(layout, sample);
   SampleTaps taps;
   taps.chain = out.add(chain, 1.0f);
+  if (const float lost = error_of_coarser(octaves_magnified(sample.pixel_texels)); lost > 0)
+    out.add_magnified(double{lost} * double{lost});
   for (std::size_t i = 0; i < chain.tiles.size() && chain.tiles[i] != kNoTile; ++i) {
     const int level_number = sample.level + static_cast<int>(i);
     const auto& level = layout.levels[static_cast<std::size_t>(level_number)];

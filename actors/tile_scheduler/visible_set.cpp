@@ -1,5 +1,7 @@
 #include "actors/tile_scheduler/visible_set.hpp"
 
+#include <cmath>
+
 namespace darm::tile_scheduler {
 
 std::uint32_t VisibleSet::add(const Chain& chain, float count) {
@@ -54,6 +56,7 @@ void VisibleSet::merge(const VisibleSet& other, float share, std::size_t most_ta
     if (theirs.kinds & TileUse::kBorder) mine->border |= theirs.border;
   }
   samples_ += other.samples_ * double{share};
+  magnified_ += other.magnified_ * double{share};
   left_out_ += other.left_out_;
 }
 
@@ -72,6 +75,12 @@ void VisibleSet::forget_early() {
 }
 
 void VisibleSet::clear() { *this = VisibleSet{}; }
+
+float VisibleSet::resolution_error() const {
+  double weight = 0;
+  for (const float count : counts_) weight += double{count};
+  return weight > 0 ? static_cast<float>(std::sqrt(magnified_ / weight)) : 0.0f;
+}
 
 const TileUse* VisibleSet::find(TileId tile) const {
   const auto number = tiles_.find(tile);

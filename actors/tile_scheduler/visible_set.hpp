@@ -41,6 +41,8 @@ class VisibleSet {
   std::uint32_t add(const Chain& chain, float count);
   /// Where a sample of chain number `taps.chain` looks.
   void add_taps(const SampleTaps& taps);
+  /// Squared display error of a sample for want of finer texels than the atlas has.
+  void add_magnified(double squared_error) { magnified_ += squared_error; }
   /// A sample that hit nothing: counts in samples() only.
   void add_samples(double count) { samples_ += count; }
   /// The texels of `tile`; null if the set is full. Valid until the next call.
@@ -61,6 +63,8 @@ class VisibleSet {
   [[nodiscard]] std::span<const TileUse> uses() const { return uses_; }  ///< parallel to tiles()
   [[nodiscard]] const TileUse* find(TileId tile) const;
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
+  /// RMS over the samples on surfaces of what add_magnified() was told, 0..1.
+  [[nodiscard]] float resolution_error() const;
 
  private:
   static constexpr std::array<TileId, kMaxLevels> no_tiles() {
@@ -75,6 +79,7 @@ class VisibleSet {
   TileIndex tiles_;
   std::vector<TileUse> uses_;
   double samples_ = 0;
+  double magnified_ = 0;
   std::size_t left_out_ = 0;
   // Neighbouring samples mostly share chain and tiles: the last tile of each level, the last chain.
   std::array<TileId, kMaxLevels> last_tile_ = no_tiles();

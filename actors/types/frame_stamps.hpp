@@ -29,7 +29,8 @@ struct ViewAnswer {
   SessionId session{};
   CameraSequence sequence = 0;
   FrameStamps stamps;
-  float error = 0;  ///< estimated RMS display error of that session's view, 0..1
+  float error = 0;             ///< estimated RMS display error of the light of that session's view, 0..1
+  float resolution_error = 0;  ///< beside it: of an atlas whose finest texels are larger than the view's pixels
 };
 
 }  // namespace darm

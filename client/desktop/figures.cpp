@@ -86,7 +86,8 @@ PanelLines panel_lines(const Measured& m) {
           {"Stream", rate_text(m.bits_per_second)},
           {"Shading lag", m.lag_ms ? fmt::format("{:.0f} ms", *m.lag_ms) : "-"},
           {"Coarser than asked", fallback ? fmt::format("{:.1f} %", *fallback * 100) : "-"},
-          {"Error of the view", m.error && *m.error >= 0 ? error_text(*m.error) : "-"},
+          {"Error of the light", m.error && *m.error >= 0 ? error_text(*m.error) : "-"},
+          {"Error of resolution", error_text(m.resolution_error)},
           {"Cost", cost}};
 }
 
@@ -106,6 +107,7 @@ std::string report_json(const VisitFigures& f, const Measured& last) {
   j["joins"] = f.joins;
   j["bytes"] = last.traffic.received;
   j["error"] = optional(last.error);
+  j["resolution_error"] = last.resolution_error;
   j["fallback"] = optional(last.residency ? fallback_share(*last.residency) : std::nullopt);
   j["size"] = {f.width, f.height};
   j["guard_divisor"] = f.coarsest;

@@ -56,7 +56,8 @@ struct Measured {
   Traffic traffic;
   std::optional<double> lag_ms;  ///< from a camera sent until a picture made for it was drawn
   std::optional<ResidencyCounts> residency;
-  std::optional<double> error;  ///< estimated RMS display error, 0..1
+  std::optional<double> error;  ///< estimated RMS display error of the light, 0..1
+  double resolution_error = 0;  ///< beside it: for want of finer texels than the atlas has
   double seconds = 0;           ///< since the start
 };
 

@@ -213,9 +213,10 @@ Result<void> LiveStream::begin_scene(const wire::SceneManifest& manifest) {
   return {};
 }
 
-void LiveStream::note_answer(std::uint64_t answers, double error) {
+void LiveStream::note_answer(std::uint64_t answers, double error, double resolution_error) {
   answered_ = std::max(answered_, answers);
   if (error >= 0 && std::isfinite(error)) answer_.error = error;
+  if (resolution_error >= 0 && std::isfinite(resolution_error)) answer_.resolution_error = resolution_error;
 }
 
 Result<void> LiveStream::handle_frame(const Received& message) {
@@ -237,7 +238,7 @@ Result<void> LiveStream::handle_frame(const Received& message) {
     a.frame = frame.frame();
     if (a.decode_ms.size() < 1000) a.decode_ms.push_back(static_cast<double>(decode_us_) / 1000);
     a.answers_us = std::max(a.answers_us, frame.stamps().client_sent());
-    note_answer(frame.answers(), static_cast<double>(frame.error()));
+    note_answer(frame.answers(), static_cast<double>(frame.error()), static_cast<double>(frame.resolution_error()));
   });
   return {};
 }
@@ -282,7 +283,8 @@ Result<void> LiveStream::handle(const Received& message) {
       return handle_view_frame(e.view_frame());
     case wire::Envelope::kNoChange: {
       const std::lock_guard lock(mutex_);
-      note_answer(e.no_change().answers(), static_cast<double>(e.no_change().error()));
+      note_answer(e.no_change().answers(), static_cast<double>(e.no_change().error()),
+                  static_cast<double>(e.no_change().resolution_error()));
       const std::int64_t sent = e.no_change().stamps().client_sent();
       if (sent > 0) answer_.lag_ms = static_cast<double>(message.at_us - sent) / 1000;
       return {};

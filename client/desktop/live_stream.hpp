@@ -42,7 +42,8 @@ struct Arrivals {
 
 /// What is known of the view without a new picture.
 struct Answer {
-  std::optional<double> error;   ///< the newest estimate
+  std::optional<double> error;   ///< the newest estimate, of light
+  double resolution_error = 0;   ///< beside it: for want of finer texels than the atlas has
   std::optional<double> lag_ms;  ///< from a camera sent until the server said that its picture needs no change
 };
 
@@ -89,7 +90,7 @@ class LiveStream {
   [[nodiscard]] Result<void> handle_frame(const Received& message);
   [[nodiscard]] Result<void> handle_view_frame(const wire::StreamFrame& frame);
   // Under the lock.
-  void note_answer(std::uint64_t answers, double error);
+  void note_answer(std::uint64_t answers, double error, double resolution_error);
   [[nodiscard]] Result<void> send_due(Connection& connection);
   [[nodiscard]] Result<void> ask_for_keys(Connection& connection, std::int64_t now);
   // Changes the arrivals under the lock, then wakes whoever draws.

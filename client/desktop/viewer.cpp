@@ -151,6 +151,7 @@ void Viewer::move(double since) {
 void Viewer::take_answer() {
   const Answer answer = stream_->take_answer();
   if (answer.error) measured_.error = answer.error;
+  measured_.resolution_error = answer.resolution_error;
   if (answer.lag_ms) note_lag(*answer.lag_ms);
 }
 

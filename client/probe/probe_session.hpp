@@ -69,7 +69,8 @@ struct SessionReport {
   double stream_seconds = 0;  ///< from the first image on
   std::uint64_t stream_bytes_after_first_image = 0;
   std::uint64_t frames = 0, key_frames = 0, no_changes = 0, answers = 0, cameras = 0, frames_lost = 0;
-  std::optional<double> error;  ///< the server's newest estimate
+  std::optional<double> error;  ///< the server's newest estimate, of light
+  double resolution_error = 0;  ///< beside it: for want of finer texels than the atlas has
   std::vector<SeriesPoint> series;
   std::map<std::string, std::vector<double>> latency_ms;
   std::vector<LagSample> lag;        ///< with `lag`

@@ -74,6 +74,8 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_view_key_frames_put_off_total", "Key frames of private layers asked for too soon, and made later"},
     {"darm_view_pictures_total", "Pictures of tiles of private layers"},
     {"darm_view_private_tiles", "Tiles that a view's private layer should have"},
+    {"darm_view_resolution_error",
+     "Estimated RMS display error (0..1) of a view for want of finer texels than the atlas has"},
     {"darm_view_samples_total", "Samples of light that depends on the eye"},
     {"darm_view_sessions", "Sessions with a private layer"},
     {"darm_view_shade_seconds_total", "Time in shading for private layers"},

@@ -23,6 +23,7 @@ TEST(Figures, ThePanelTellsNumbersWithTheirUnits) {
   m.bits_per_second = 1.62e6;
   m.lag_ms = 132.4;
   m.error = 0.01;
+  m.resolution_error = 0.1;
   m.traffic.received = 3'200'000;
   m.seconds = 100;
   m.residency = ResidencyCounts{1000, 10, 810, 50, 30, 100};
@@ -31,7 +32,8 @@ TEST(Figures, ThePanelTellsNumbersWithTheirUnits) {
   EXPECT_EQ(lines.at("Stream"), "1.6 Mbit/s");
   EXPECT_EQ(lines.at("Shading lag"), "132 ms");
   EXPECT_EQ(lines.at("Coarser than asked"), "10.0 %") << "of the samples that show a surface";
-  EXPECT_EQ(lines.at("Error of the view"), "2.55 of 255 (40.0 dB)");
+  EXPECT_EQ(lines.at("Error of the light"), "2.55 of 255 (40.0 dB)");
+  EXPECT_EQ(lines.at("Error of resolution"), "25.50 of 255 (20.0 dB)");
   EXPECT_EQ(lines.at("Cost"), "3.2 MB (115.2 MB an hour), ms: decoding 6, uploading 2, drawing 4");
 }
 
@@ -40,7 +42,7 @@ TEST(Figures, WhatIsNotKnownIsNotSaid) {
   EXPECT_EQ(lines.at("Frames a second"), "still");
   EXPECT_EQ(lines.at("Shading lag"), "-");
   EXPECT_EQ(lines.at("Coarser than asked"), "-");
-  EXPECT_EQ(lines.at("Error of the view"), "-");
+  EXPECT_EQ(lines.at("Error of the light"), "-");
   EXPECT_FALSE(fallback_share(ResidencyCounts{5, 0, 0, 0, 0, 5})) << "only sky is seen";
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "actors/tile_scheduler/coarseness.hpp"
 #include "actors/tile_scheduler/image_store.hpp"
 #include "actors/tile_scheduler/visibility.hpp"
 #include "actors/tile_scheduler/working_set.hpp"
@@ -98,7 +99,7 @@ TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
         d.chains, d.granted.served, [this](TileId t) { return find(t); }, world_.layout->coarse_level(), has_coarse);
   };
   EXPECT_FLOAT_EQ(error(false), ErrorOptions{}.unlit);
-  EXPECT_LE(error(true), ErrorOptions{}.coarser.back());
+  EXPECT_LE(error(true), error_of_coarser(16));
   for (std::size_t i = 0; i < d.target.tiles.size(); i += 2) shade(d.target.tiles[i], 0.1f);
   const auto lookup = [this](TileId t) { return find(t); };
   grant_available(d, world_.layout->coarse_level(), PageTable(4096), lookup, {});

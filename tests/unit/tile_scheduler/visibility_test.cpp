@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "actors/tile_scheduler/coarseness.hpp"
 #include "actors/tile_scheduler/texel_taps.hpp"
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
@@ -52,6 +53,29 @@ TEST(SharpLevel, MatchesTheFormulaOnAPlaneAtKnownDistance) {
     EXPECT_NEAR(footprint.major * 64, texels, 1e-3f * texels);
     EXPECT_EQ(out[0].level, std::clamp(static_cast<int>(std::floor(std::log2(texels))), 0, 5));
   }
+}
+
+// Each halving of the texels under a pixel is an octave; what is finer than asked for is no error.
+TEST(ResolutionError, IsThatOfTheOctavesTheAtlasLacks) {
+  for (const float distance : {0.25f, 1.0f, 4.0f, 16.0f}) {
+    const auto world = make_world({Quad{{-50, -50, -distance}, {1, 0, 0}, {0, 1, 0}, 100, 100}}, 64, 6);
+    const auto camera = look_at({0, 0, 0}, {0, 0, -1}, 60);
+    const ViewSampler sampler(*world.layout, *world.rays, camera, kViewport);
+    VisibleSet set;
+    trace_rows(sampler, 0, 0, 4, set);
+    const float octaves = -std::log2(distance * pixel_spread(camera, kViewport) * 64);
+    EXPECT_NEAR(set.resolution_error(), error_of_coarser(octaves), 1e-3f) << distance;
+    if (distance == 0.25f) EXPECT_GT(set.resolution_error(), 0.01f);
+    if (distance == 16.0f) EXPECT_EQ(set.resolution_error(), 0.0f);
+    VisibleSet both;
+    both.merge(set, 0.25f);
+    EXPECT_NEAR(both.resolution_error(), set.resolution_error(), 1e-6f) << "a mean, whatever the weight";
+  }
+  EXPECT_EQ(VisibleSet{}.resolution_error(), 0.0f);
+  EXPECT_EQ(octaves_magnified(NAN), 0.0f);
+  EXPECT_EQ(error_of_coarser(NAN), 0.0f);
+  for (float octaves = 0; octaves < 20; octaves += 0.25f)
+    EXPECT_LE(error_of_coarser(octaves), error_of_coarser(octaves + 0.25f));
 }
 
 // A floor seen at angle a below the horizon: across the view the footprint is distance * spread, along it 1 / sin(a)

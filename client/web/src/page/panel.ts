@@ -14,8 +14,10 @@ export interface Measured {
   lagMs: number | null;
   lagStages: (LagStages & {display: number}) | null;
   residency: Residency | null;
-  /** Estimated RMS display error, 0..1; null: none yet. */
+  /** Estimated RMS display error of the light, 0..1; null: none yet. */
   error: number | null;
+  /** Beside it: for want of finer texels than the atlas has. */
+  resolutionError: number;
   seconds: number;
 }
 
@@ -36,6 +38,11 @@ function parts(stages: LagStages & {display: number}): string {
   return Object.entries(stages).map(([name, ms]) => `${name} ${ms.toFixed(0)}`).join(', ');
 }
 
+// PSNR = -20 log10 of the RMS error.
+function errorText(error: number): string {
+  return `${(error * 255).toFixed(2)} of 255${error > 0 ? ` (${(-20 * Math.log10(error)).toFixed(1)} dB)` : ''}`;
+}
+
 /** Label and value of each line, by the name of its place in the page. */
 export function lines(m: Measured): Record<string, string> {
   const fallback = m.residency === null ? null : m.residency.coarser + m.residency.coarseTex + m.residency.undefined;
@@ -45,9 +52,8 @@ export function lines(m: Measured): Record<string, string> {
     stream: rate(m.bitsPerSecond),
     lag: m.lagMs === null ? '–' : `${m.lagMs.toFixed(0)} ms${m.lagStages === null ? '' : `: ${parts(m.lagStages)}`}`,
     fallback: fallback === null ? '–' : percent(fallback),
-    // PSNR = -20 log10 of the RMS error.
-    error: m.error === null || m.error < 0 ? '–'
-      : `${(m.error * 255).toFixed(2)} of 255${m.error > 0 ? ` (${(-20 * Math.log10(m.error)).toFixed(1)} dB)` : ''}`,
+    error: m.error === null || m.error < 0 ? '–' : errorText(m.error),
+    resolution: errorText(m.resolutionError),
     cost: `${bytes(m.traffic.received)}${perHour}, decoding ${m.traffic.decodeMs.toFixed(0)} ms, ` +
           `drawing ${m.drawMs.toFixed(0)} ms`,
   };

@@ -35,6 +35,7 @@ export interface Status {
   mode: string;
   view: View | null;
   error: number | null;
+  resolutionError: number;
   lagMs: number | null;
   /** What it is made of. */
   lagStages: (LagStages & {display: number}) | null;
@@ -83,7 +84,7 @@ export class Visit implements InputOwner {
     framesLost: 0};
   private residency: Residency | null = null;
   private status: Status = {firstPictureMs: null, bytesToFirstPicture: null, firstPictureBytes: null, framesDrawn: 0, streamFrames: 0,
-    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, lagMs: null, lagStages: null, residency: null,
+    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, resolutionError: 0, lagMs: null, lagStages: null, residency: null,
     received: 0, cost: {drawMs: 0, decodeMs: 0, uploadMs: 0, level: 0}};
   private uploadMs = 0;
   private shownFrame = 0;
@@ -159,10 +160,11 @@ export class Visit implements InputOwner {
         this.coarse = m.picture;
         this.renderer?.putCoarse(m.picture);
         return this.redraw();
-      case 'frame': return this.takeFrame(m.update, m.answer, m.error);
+      case 'frame':
+        this.noteError(m.error, m.resolutionError);
+        return this.takeFrame(m.update, m.answer);
       case 'answer':
-        if (m.error >= 0) this.status.error = m.error;
-        return;
+        return this.noteError(m.error, m.resolutionError);
       case 'traffic': return this.noteTraffic(m.traffic);
       case 'out': return this.out(m.reason, m.text, m.retryMs);
     }
@@ -218,7 +220,14 @@ export class Visit implements InputOwner {
     this.notices.quiet('');
   }
 
-  private takeFrame(update: FrameUpdate, answer: Answer | null, error: number): void {
+  // Frames of the private layer say nothing of it: -1.
+  private noteError(error: number, resolutionError: number): void {
+    if (!(error >= 0)) return;
+    this.status.error = error;
+    this.status.resolutionError = resolutionError;
+  }
+
+  private takeFrame(update: FrameUpdate, answer: Answer | null): void {
     const before = performance.now();
     this.renderer?.apply(update);
     this.uploadMs = performance.now() - before;
@@ -226,7 +235,6 @@ export class Visit implements InputOwner {
     if (update.layer === 'shared') this.shownFrame = update.frame;
     ++this.status.streamFrames;
     if (answer !== null) this.answer = answer;
-    if (error >= 0) this.status.error = error;
     this.redraw();
   }
 
@@ -380,7 +388,8 @@ export class Visit implements InputOwner {
     this.panel.update({
       framesPerSecond: moving ? this.timer.framesPerSecond : null, drawMs: this.timer.lastMs, level: this.guard.level,
       bitsPerSecond: span > 0 ? ((last!.bytes - first!.bytes) * 8000) / span : 0, traffic: this.traffic,
-      lagMs: this.status.lagMs, lagStages: this.status.lagStages, residency: this.residency, error: this.status.error, seconds: now / 1000});
+      lagMs: this.status.lagMs, lagStages: this.status.lagStages, residency: this.residency, error: this.status.error,
+      resolutionError: this.status.resolutionError, seconds: now / 1000});
   }
 
   // ---- buttons, keys, the link ---------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ export type FromWorker =
   | {type: 'scene'; scene: SceneShape}
   | {type: 'chunk'; chunk: Chunk}
   | {type: 'coarse'; picture: Planes}
-  | {type: 'frame'; update: FrameUpdate; answer: Answer | null; error: number}
-  | {type: 'answer'; error: number}
+  | {type: 'frame'; update: FrameUpdate; answer: Answer | null; error: number; resolutionError: number}
+  | {type: 'answer'; error: number; resolutionError: number}
   | {type: 'traffic'; traffic: Traffic}
   | {type: 'out'; reason: OutReason; text: string; retryMs: number};

@@ -142,7 +142,7 @@ export class Session implements SocketOwner {
       case 'frame': return this.takeFrame(this.player, body.value, true, receivedUs);
       case 'viewFrame': return this.takeFrame(this.viewPlayer, body.value, false, receivedUs);
       case 'noChange':
-        return this.post({type: 'answer', error: body.value.error});
+        return this.post({type: 'answer', error: body.value.error, resolutionError: body.value.resolutionError});
       default:  // a newer server may say more
     }
   }
@@ -211,7 +211,8 @@ export class Session implements SocketOwner {
       const transfer: Transferable[] = update.pages.map((rows) => rows.slots.buffer);
       if (update.picture) transfer.push(update.picture.buffer);
       const answer = shared ? answerOf(frame.stamps, receivedUs, sharedNowUs()) : null;
-      this.post({type: 'frame', update, answer, error: shared ? frame.error : -1}, transfer);
+      this.post({type: 'frame', update, answer, error: shared ? frame.error : -1,
+                 resolutionError: frame.resolutionError}, transfer);
     }
     this.traffic.framesLost = (this.player?.framesLost ?? 0) + (this.viewPlayer?.framesLost ?? 0);
     this.repair();
