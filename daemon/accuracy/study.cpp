@@ -1,12 +1,15 @@
 #include "daemon/accuracy/study.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <utility>
 
 #include "actors/scene/effect_plan.hpp"
 #include "daemon/accuracy/camera_study.hpp"
+#include "daemon/accuracy/machine_speed.hpp"
 #include "daemon/accuracy/report/results_file.hpp"
 #include "daemon/accuracy/report/text.hpp"
 #include "daemon/accuracy/result_key.hpp"
@@ -22,6 +25,9 @@ namespace fs = std::filesystem;
 
 /// Seconds that drawing and comparing come to, for the bar.
 constexpr double kOverhead = 5;
+
+/// Of looking at the machine's speed, before and after each variant.
+constexpr double kSpeedSeconds = 0.1;
 
 using Kept = std::map<std::string, Measurement>;  // by key
 
@@ -75,6 +81,9 @@ class Runner {
   [[nodiscard]] fs::path results_file() const { return options_.out / "results.jsonl"; }
   [[nodiscard]] std::string key_of(const NamedView& view, const Variant& variant) const;
   [[nodiscard]] CameraStudyOptions camera_options(const NamedView& view) const;
+  [[nodiscard]] double speed_now(const NamedView& view) const {
+    return rays_per_second(*world_.rays, view.camera, threads_, kSpeedSeconds);
+  }
   [[nodiscard]] Result<void> measure_view(const NamedView& view, const std::vector<Variant>& variants);
   void describe();
   void collect(const std::vector<NamedView>& views, const std::vector<Variant>& all);
@@ -83,6 +92,8 @@ class Runner {
   Progress& progress_;
   const World& world_;
   unsigned threads_;
+  double began_ =
+      std::floor(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count());
   Kept kept_;
   std::vector<std::string> blind_;  // cameras that see nothing
   bool alone_ = false;              // there is one camera
@@ -130,6 +141,7 @@ Result<void> Runner::measure_view(const NamedView& view, const std::vector<Varia
       progress_.done(worth_of(variant), words_of(kept_[key]) + " (measured before)");
       continue;
     }
+    const double before = speed_now(view);
     auto outcome = camera.measure(variant);
     if (!outcome) return std::unexpected(outcome.error().within(view.name + ": " + variant.name));
     if (!outcome->impossible.empty()) {
@@ -142,6 +154,8 @@ Result<void> Runner::measure_view(const NamedView& view, const std::vector<Varia
     }
     auto& m = *outcome->measurement;
     m.key = key;
+    m.figures[figure::kRunBegan] = began_;
+    m.figures[figure::kRaysPerSecond] = (before + speed_now(view)) / 2;
     if (auto saved = append_result(results_file(), m); !saved) return saved;
     ++study_.measured;
     progress_.done(worth_of(variant), words_of(m));

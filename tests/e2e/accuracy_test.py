@@ -93,8 +93,11 @@ class Accuracy(unittest.TestCase):
         self.assertFalse((self.out / ".darmd-accuracy-run").exists())
         done = len(results.read_text().splitlines())
         self.assertLess(done, 3)
-        _, said = self.study("--only", "sky,balanced,filter")
+        report, said = self.study("--only", "sky,balanced,filter")
         self.assertIn(f"{3 - done} measured, {done} from before", said)
+        runs = {m["figures"]["run_began"] for m in report["measurements"]}
+        self.assertEqual(len(runs), 2)
+        self.assertIn("* Measured in another run", (self.out / "accuracy.html").read_text())
 
     def test_one_wish_to_stop_that_is_sent_twice_is_one(self):
         # As timeout(1) sends it: to the process, and to its group.

@@ -57,6 +57,8 @@ inline constexpr const char* kAtLeast = "at_least";                ///< 1: `with
 inline constexpr const char* kSecondsWith = "seconds_with";        ///< of one sample per pixel, with the effect
 inline constexpr const char* kSecondsWithout = "seconds_without";  ///< and without
 inline constexpr const char* kStoppedEarly = "finished_after";     ///< seconds after which nothing changed any more
+inline constexpr const char* kRunBegan = "run_began";              ///< when the process began, seconds since 1970
+inline constexpr const char* kRaysPerSecond = "rays_per_second";   ///< of the machine, just before and after
 }  // namespace figure
 
 /// One effect of the plan, as the scene calls for it.
