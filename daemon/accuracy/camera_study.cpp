@@ -178,8 +178,10 @@ Result<CameraStudy::Outcome> CameraStudy::measure_codec(const Variant& variant) 
   auto m = begin(variant);
   m.curve = recoded->curve;
   m.figures[figure::kBytes] = recoded->bytes;
-  m.figures[figure::kFirstBytes] = recoded->first_bytes;
-  m.figures[figure::kFirstCodecDb] = recoded->first_codec_db;
+  if (recoded->first) {
+    m.figures[figure::kFirstBytes] = recoded->first->bytes;
+    m.figures[figure::kFirstCodecDb] = recoded->first->codec_db;
+  }
   m.figures[figure::kLastCodecDb] = recoded->last_codec_db;
   m.figures[figure::kEncodeSeconds] = recoded->encode_seconds;
   return Outcome{std::move(m), {}};

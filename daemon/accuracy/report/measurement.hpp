@@ -48,7 +48,7 @@ struct Measurement {
 namespace figure {
 inline constexpr const char* kLightDb = "light_db";                ///< the last picture without the codec
 inline constexpr const char* kBytes = "bytes";                     ///< of the whole stream
-inline constexpr const char* kFirstBytes = "first_bytes";          ///< of its first frame with tiles
+inline constexpr const char* kFirstBytes = "first_bytes";          ///< of it until the view is mostly tiles
 inline constexpr const char* kFirstCodecDb = "first_codec_db";     ///< that picture after the codec against before
 inline constexpr const char* kLastCodecDb = "last_codec_db";       ///< the last one likewise
 inline constexpr const char* kEncodeSeconds = "encode_seconds";    ///< mean of one frame

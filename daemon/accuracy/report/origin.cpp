@@ -60,7 +60,8 @@ std::string Origins::words_of(const Measurement& m) const {
   const auto date = date_text(figure_or_0(m, figure::kRunBegan));
   std::string out = is_of_last_run(m) ? "last run" : date.empty() ? "earlier, it is not known when" : date;
   if (is_apart(m) && figure_or_0(m, figure::kRaysPerSecond) > 0 && speed_ > 0)
-    out += ", rays at " + ratio_text(speed_ratio(m)) + " times the last run's speed";
+    out += ", rays at " + ratio_text(speed_ratio(m)) + " times " + (is_of_last_run(m) ? "its" : "the last run's") +
+           " usual speed";
   return out;
 }
 

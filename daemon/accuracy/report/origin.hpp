@@ -18,7 +18,8 @@ class Origins {
   [[nodiscard]] bool is_apart(const Measurement& m) const;
   /// The variant's name, with a star where it is apart.
   [[nodiscard]] std::string name_of(const Measurement& m) const;
-  /// "last run", "2026-01-31 12:03 UTC, rays at 0.61 times the last run's speed", "earlier, it is not known when".
+  /// "last run", "2026-01-31 12:03 UTC, rays at 0.61 times the last run's usual speed", "earlier, it is not known
+  /// when".
   [[nodiscard]] std::string words_of(const Measurement& m) const;
   /// "Measured 2026-01-31 12:03 UTC"; empty where it is not known.
   [[nodiscard]] std::string when() const;

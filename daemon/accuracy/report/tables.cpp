@@ -148,8 +148,8 @@ Table alternative_table(const Measurement& ours, const Measurement& plain, const
 
 Table codec_table(const Curves& curves, const Origins& origins) {
   Table table{"The same light through the codec",
-              {"quality", "codec, first picture, dB", "codec, last picture, dB", "dB to the reference", "first picture",
-               "whole stream", "a frame, ms"},
+              {"quality", "codec, first picture, dB", "codec, last picture, dB", "dB to the reference",
+               "until the first picture", "whole stream", "a frame, ms"},
               {}};
   for (const auto* result : curves) {
     const auto& m = *result;
@@ -239,7 +239,8 @@ std::string words_of(Group group) {
       return "The same integrator tracing camera frames on the same threads.";
     case Group::kCodec:
       return "One recorded run of the balanced preset, coded again at each constant rate factor. Codec dB: the drawn "
-             "view after the codec against before.";
+             "view after the codec against before. The first picture is the first of which half is tiles: what is "
+             "coarser does not go through this codec.";
     default:
       return "The reference tracer with and without, eight samples a pixel each. The difference is taken between two "
              "pairs of independent halves, so that noise cancels; within two standard errors it is given as a bound. "

@@ -58,7 +58,7 @@ TEST(Origins, WhatAnotherRunMeasuredHasAStarADateAndASpeed) {
   const auto r = resumed();
   const Origins origins(r);
   EXPECT_EQ(origins.name_of(r.measurements[0]), "balanced *");
-  EXPECT_EQ(origins.words_of(r.measurements[0]), "2026-01-31 22:53 UTC, rays at 0.50 times the last run's speed");
+  EXPECT_EQ(origins.words_of(r.measurements[0]), "2026-01-31 22:53 UTC, rays at 0.50 times the last run's usual speed");
   EXPECT_EQ(origins.name_of(r.measurements[1]), "q 32");
   EXPECT_EQ(origins.words_of(r.measurements[1]), "last run");
   EXPECT_EQ(origins.words_of(r.measurements[3]), "earlier, it is not known when");
@@ -70,7 +70,7 @@ TEST(Origins, AnotherLoadInOneRunHasAStarToo) {
   const Origins origins(r);
   EXPECT_FALSE(origins.is_apart(r.measurements[0]));
   EXPECT_EQ(origins.name_of(r.measurements[2]), "q 128 *");
-  EXPECT_EQ(origins.words_of(r.measurements[2]), "last run, rays at 0.50 times the last run's speed");
+  EXPECT_EQ(origins.words_of(r.measurements[2]), "last run, rays at 0.50 times its usual speed");
 }
 
 TEST(Origins, EachTableThatMixesRunsSaysSo) {
