@@ -141,6 +141,8 @@ Result<void> Runner::measure_view(const NamedView& view, const std::vector<Varia
       progress_.done(worth_of(variant), words_of(kept_[key]) + " (measured before)");
       continue;
     }
+    study_.stopped = options_.stopped && options_.stopped();  // not every variant asks
+    if (study_.stopped) return {};
     const double before = speed_now(view);
     auto outcome = camera.measure(variant);
     if (!outcome) return std::unexpected(outcome.error().within(view.name + ": " + variant.name));

@@ -102,6 +102,16 @@ class Accuracy(unittest.TestCase):
         self.assertEqual(len(runs), 2)
         self.assertIn("* Measured in another run", (self.out / "accuracy.html").read_text())
 
+    def test_a_stop_waits_for_no_further_variant(self):
+        running = subprocess.Popen(self.command("--only", "codec"), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True)
+        results = self.out / "results.jsonl"
+        wait_until(lambda: results.exists() and results.stat().st_size > 0, 100, "a first result")
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 130, said)
+        self.assertLess(len(results.read_text().splitlines()), 5, said)
+
     def test_one_wish_to_stop_that_is_sent_twice_is_one(self):
         # As timeout(1) sends it: to the process, and to its group.
         running = subprocess.Popen(self.command("--only", "balanced"), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
