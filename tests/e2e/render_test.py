@@ -50,9 +50,14 @@ class Render(unittest.TestCase):
         self.assertIn("warning", said)
 
     def start(self, *more, state=None):
-        return subprocess.Popen(
+        """A run that would take minutes."""
+        running = subprocess.Popen(
             [BIN / "darmd", "render", "--config", SET_UP, "--camera", "hall", "--size", "32x18", "--spp", "1000000",
              "--state-dir", state or self.state, "--out", self.out, *more], stderr=subprocess.PIPE, text=True)
+        self.addCleanup(running.stderr.close)
+        self.addCleanup(running.wait)
+        self.addCleanup(running.kill)
+        return running
 
     def test_an_interrupted_picture_is_kept_and_goes_on(self):
         running = self.start()

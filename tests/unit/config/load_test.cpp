@@ -43,7 +43,7 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   const std::vector<std::filesystem::path> files{kDocumented};
   const auto loaded = load(files);
   ASSERT_TRUE(loaded) << to_string(loaded.error());
-  const Config a = *loaded;
+  const Config& a = *loaded;
   const Config b;
   EXPECT_EQ(a.scene.file, b.scene.file);
   EXPECT_EQ(a.scene.q, b.scene.q);
