@@ -1,17 +1,16 @@
 // darmd accuracy: what accuracy costs in time, as a page, tables and files.
-#include <atomic>
+#include <array>
 #include <cctype>
 #include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <string>
-#include <system_error>
 
 #include "daemon/accuracy/report/report_page.hpp"
 #include "daemon/accuracy/study.hpp"
 #include "daemon/commands.hpp"
-#include "daemon/lifecycle/stop_signals.hpp"
+#include "daemon/lifecycle/interruption.hpp"
 #include "daemon/observe/log.hpp"
+#include "daemon/writable.hpp"
 
 namespace darm {
 namespace {
@@ -34,17 +33,24 @@ Result<void> write_text(const fs::path& file, const std::string& text) {
   return {};
 }
 
+constexpr std::array kFiles{"accuracy.html", "accuracy.md", "accuracy.json", "curves.csv", "figures.csv"};
+
+// The study looks after its own.
+Result<void> check_places(const fs::path& folder) {
+  for (const fs::path& made : {folder, folder / "pictures"})
+    if (auto ok = make_writable_folder(made); !ok) return ok;
+  for (const char* name : kFiles)
+    if (auto ok = check_writable_file(folder / name); !ok) return ok;
+  return {};
+}
+
 Result<void> write_report(const fs::path& folder, const accuracy::Report& report) {
   const std::string prefix = picture_prefix(report);
-  std::error_code error;
-  fs::create_directories(folder / "pictures", error);
-  if (error) return fail((folder / "pictures").string() + ": cannot be made: " + error.message());
   auto files = accuracy::svg_files(report, prefix);
-  files.emplace_back("accuracy.html", accuracy::html_page(report));
-  files.emplace_back("accuracy.md", accuracy::markdown_page(report, prefix));
-  files.emplace_back("accuracy.json", accuracy::json_text(report));
-  files.emplace_back("curves.csv", accuracy::curves_csv(report));
-  files.emplace_back("figures.csv", accuracy::figures_csv(report));
+  const std::array texts{accuracy::html_page(report), accuracy::markdown_page(report, prefix),
+                         accuracy::json_text(report), accuracy::curves_csv(report), accuracy::figures_csv(report)};
+  static_assert(texts.size() == kFiles.size());
+  for (std::size_t i = 0; i < texts.size(); ++i) files.emplace_back(kFiles[i], texts[i]);
   for (const auto& [name, text] : files)
     if (auto written = write_text(folder / name, text); !written) return written;
   return {};
@@ -53,10 +59,7 @@ Result<void> write_report(const fs::path& folder, const accuracy::Report& report
 }  // namespace
 
 int run(const AccuracyCommand& command) {
-  std::atomic<bool> asked{false};
-  const lifecycle::StopSignals signals([&asked](int) {
-    if (asked.exchange(true)) std::_Exit(130);  // the second one means now
-  });
+  const lifecycle::Interruption interruption("darmd accuracy");
   observe::set_up_log("warn", false);  // standard error is the progress's
   accuracy::StudyOptions options;
   options.config = command.config;
@@ -66,12 +69,13 @@ int run(const AccuracyCommand& command) {
   options.viewport = {command.width, command.height};
   options.seconds = command.seconds;
   options.reference_psnr = command.reference_psnr;
-  options.stopped = [&asked] { return asked.load(); };
+  options.stopped = [&interruption] { return interruption.asked(); };
   const auto failed = [](const Error& error) {
     std::fprintf(stderr, "darmd accuracy: %s\n", error.message.c_str());
     return 1;
   };
-  accuracy::Progress progress("darmd accuracy", command.json);
+  if (auto ok = check_places(command.out); !ok) return failed(ok.error());
+  Progress progress("darmd accuracy", command.json);
   const auto study = accuracy::run_study(options, progress);
   if (!study) return failed(study.error());
   if (auto written = write_report(command.out, study->report); !written) return failed(written.error());
@@ -83,7 +87,7 @@ int run(const AccuracyCommand& command) {
   }
   if (!study->stopped) return 0;
   std::fprintf(stderr, "darmd accuracy: interrupted; the same command goes on where it stopped\n");
-  return 130;
+  return lifecycle::kInterrupted;
 }
 
 }  // namespace darm

@@ -13,6 +13,7 @@
 #include "actors/scene/effect_plan.hpp"
 #include "actors/tile_scheduler/view_report.hpp"
 #include "daemon/commands.hpp"
+#include "daemon/lifecycle/stop_signals.hpp"
 #include "daemon/scene_setup.hpp"
 #include "daemon/world.hpp"
 
@@ -196,6 +197,7 @@ void print(const json& r) {
 }  // namespace
 
 int run(const InspectCommand& command) {
+  lifecycle::release_stop_signals();  // there is nothing to keep
   const auto failed = [](const Error& error) {
     std::fprintf(stderr, "darmd inspect: %s\n", error.message.c_str());
     return 1;

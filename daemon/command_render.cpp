@@ -1,14 +1,23 @@
 // darmd render: the unbiased reference picture of one camera, in two halves, with its own error.
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
-#include <thread>
+#include <system_error>
+#include <utility>
 
 #include "actors/renderer/exposure.hpp"
 #include "actors/renderer/reference_renderer.hpp"
 #include "daemon/commands.hpp"
+#include "daemon/lifecycle/interruption.hpp"
+#include "daemon/progress.hpp"
 #include "daemon/reference_file.hpp"
+#include "daemon/reference_words.hpp"
 #include "daemon/scene_setup.hpp"
+#include "daemon/world.hpp"
+#include "daemon/writable.hpp"
 
 namespace darm {
 namespace {
@@ -17,39 +26,55 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t kMostSamples = 1u << 20;
 
-void warn(const std::string& what) { std::fprintf(stderr, "darmd render: warning: %s\n", what.c_str()); }
+// The files of a picture: PNG, PFM, its two halves, and the report.
+struct PictureFiles {
+  explicit PictureFiles(const fs::path& out) : base(fs::path(out).replace_extension()) {}
+  [[nodiscard]] fs::path with(const char* suffix) const { return {base.string() + suffix}; }
+  fs::path base;
+};
 
-bool report_progress(const renderer::ReferenceProgress& progress) {
-  std::fprintf(stderr, "\rdarmd render: %u of %u samples per pixel, own PSNR %.2f dB, %.0f s ", progress.spp,
-               progress.target_spp, progress.own_psnr, progress.seconds);
-  return true;
+constexpr std::array kSuffixes{".png", ".pfm", ".a.pfm", ".b.pfm", ".json"};
+
+Result<void> check_places(const RenderCommand& command) {
+  for (const char* suffix : kSuffixes)
+    if (auto ok = check_writable_file(PictureFiles(command.out).with(suffix)); !ok) return ok;
+  return {};
 }
+
+// The file of the sums, as a run finds it and leaves it.
+class KeptSums {
+ public:
+  explicit KeptSums(fs::path file) : file_(std::move(file)), before_(written()) {}
+  // What is said of a picture that was cut off: what is there, and how to go on.
+  [[nodiscard]] std::string words(const renderer::ReferencePicture& picture) const {
+    const std::string done =
+        std::to_string(picture.spp) + " samples per pixel, own PSNR " + decibel_words(picture.own_psnr) + ", ";
+    if (file_.empty() || written() == before_) return "interrupted; " + done + "could not be kept";
+    return "interrupted; " + done + "are kept in " + file_.string() + "; the same command goes on from there";
+  }
+
+ private:
+  [[nodiscard]] fs::file_time_type written() const {
+    std::error_code none;
+    const auto time = fs::last_write_time(file_, none);
+    return none ? fs::file_time_type::min() : time;
+  }
+  fs::path file_;
+  fs::file_time_type before_;
+};
 
 Result<void> write_pictures(const fs::path& out, const renderer::ReferencePicture& picture) {
-  fs::path base = out;
-  base.replace_extension();
-  const auto beside = [&base](const char* suffix) { return fs::path(base.string() + suffix); };
-  if (auto written = renderer::write_png(beside(".png"), picture.mean); !written) return written;
-  if (auto written = renderer::write_pfm(beside(".pfm"), picture.mean); !written) return written;
-  if (auto written = renderer::write_pfm(beside(".a.pfm"), picture.half_a); !written) return written;
-  return renderer::write_pfm(beside(".b.pfm"), picture.half_b);
+  const PictureFiles files(out);
+  if (auto written = renderer::write_png(files.with(".png"), picture.mean); !written) return written;
+  if (auto written = renderer::write_pfm(files.with(".pfm"), picture.mean); !written) return written;
+  if (auto written = renderer::write_pfm(files.with(".a.pfm"), picture.half_a); !written) return written;
+  return renderer::write_pfm(files.with(".b.pfm"), picture.half_b);
 }
 
-Result<nlohmann::json> render(const RenderCommand& command) {
-  const unsigned threads = command.config.render.threads != 0 ? command.config.render.threads
-                                                              : std::max(1u, std::thread::hardware_concurrency());
-  auto scene = load_configured_scene(command.config);
-  if (!scene) return std::unexpected(scene.error());
-  auto camera = find_camera(command.config, **scene, command.camera);
-  if (!camera) return std::unexpected(camera.error());
-  auto rays = renderer::trace::RayScene::build(*scene, threads);
-  if (!rays) return std::unexpected(rays.error());
-  renderer::TransportOptions options;
-  options.all_effects = command.all_effects;
-  const renderer::LightTransport transport(*scene, *rays, options);
-
+renderer::ReferenceJob job_of(const RenderCommand& command, const renderer::LightTransport& transport,
+                              const Camera& camera, unsigned threads) {
   renderer::ReferenceJob job;
-  job.camera = *camera;
+  job.camera = camera;
   job.viewport = {command.width, command.height};
   job.exposure = command.config.scene.exposure > 0 ? static_cast<float>(command.config.scene.exposure)
                                                    : renderer::scene_exposure(transport);
@@ -59,48 +84,80 @@ Result<nlohmann::json> render(const RenderCommand& command) {
   job.seed_a = 2 * command.seed;
   job.seed_b = 2 * command.seed + 1;
   job.threads = threads;
-  std::error_code made;
-  fs::create_directories(command.config.state.dir, made);
-  job.state_file = reference_file(command.config.state.dir, transport, job);
-  job.warn = warn;
-  if (!command.json) job.progress = report_progress;
-  auto picture = renderer::render_reference(transport, job);
-  if (!command.json) std::fprintf(stderr, "\n");
-  if (!picture) return std::unexpected(picture.error());
-  if (auto written = write_pictures(command.out, *picture); !written) return std::unexpected(written.error());
+  return job;
+}
 
-  const double rate = picture->seconds > 0 ? static_cast<double>(picture->paths) / picture->seconds : 0.0;
-  nlohmann::json report = {
-      {"camera", command.camera},    {"width", command.width},
-      {"height", command.height},    {"effects", command.view_independent ? "view-independent" : "full"},
-      {"spp", picture->spp},         {"reference_psnr", picture->own_psnr},
-      {"exposure", job.exposure},    {"paths", picture->paths},
-      {"seconds", picture->seconds}, {"paths_per_second", rate},
-      {"threads", threads},          {"integrator", renderer::to_string(transport.effects())},
-      {"out", command.out.string()}};
-  return report;
+nlohmann::json report_of(const RenderCommand& command, const renderer::ReferencePicture& picture,
+                         const renderer::ReferenceJob& job, const renderer::LightTransport& transport) {
+  const double rate = picture.seconds > 0 ? static_cast<double>(picture.paths) / picture.seconds : 0.0;
+  return {{"camera", command.camera},   {"width", command.width},
+          {"height", command.height},   {"effects", command.view_independent ? "view-independent" : "full"},
+          {"spp", picture.spp},         {"reference_psnr", std::min(picture.own_psnr, kMostDecibels)},
+          {"exposure", job.exposure},   {"paths", picture.paths},
+          {"seconds", picture.seconds}, {"paths_per_second", rate},
+          {"threads", job.threads},     {"integrator", renderer::to_string(transport.effects())},
+          {"out", command.out.string()}};
+}
+
+/// The report of the picture, or nothing: it was cut off, and that has been said.
+Result<std::optional<nlohmann::json>> render(const RenderCommand& command, const lifecycle::Interruption& interruption,
+                                             Progress& progress) {
+  if (auto ok = check_places(command); !ok) return std::unexpected(ok.error());
+  const auto state = make_writable_folder(command.config.state.dir);
+  if (!state) progress.warn(state.error().message + "; until then a picture that is cut off is begun anew");
+  const unsigned threads = thread_count(command.config);
+  auto scene = load_configured_scene(command.config);
+  if (!scene) return std::unexpected(scene.error());
+  for (const auto& warning : (*scene)->warnings) progress.warn((*scene)->path + ": " + warning);
+  auto camera = find_camera(command.config, **scene, command.camera);
+  if (!camera) return std::unexpected(camera.error());
+  auto rays = renderer::trace::RayScene::build(*scene, threads);
+  if (!rays) return std::unexpected(rays.error());
+  renderer::TransportOptions options;
+  options.all_effects = command.all_effects;
+  const renderer::LightTransport transport(*scene, *rays, options);
+
+  auto job = job_of(command, transport, *camera, threads);
+  if (state) job.state_file = reference_file(command.config.state.dir, transport, job);
+  const KeptSums kept(job.state_file);
+  job.warn = [&progress](const std::string& what) { progress.warn(what); };
+  job.progress = [&](const renderer::ReferenceProgress& now) {
+    progress.show(0, reference_words(now, kMostSamples));
+    return !interruption.asked();
+  };
+  auto picture = renderer::render_reference(transport, job);
+  if (!picture) return std::unexpected(picture.error());
+  if (picture->stopped) {
+    progress.announce(kept.words(*picture));
+    return std::nullopt;
+  }
+  if (auto written = write_pictures(command.out, *picture); !written) return std::unexpected(written.error());
+  return report_of(command, *picture, job, transport);
 }
 
 }  // namespace
 
 int run(const RenderCommand& command) {
-  const auto report = render(command);
-  if (!report) {
-    std::fprintf(stderr, "darmd render: %s\n", report.error().message.c_str());
+  const lifecycle::Interruption interruption("darmd render");
+  Progress progress("darmd render", command.json);
+  const auto made = render(command, interruption, progress);
+  if (!made) {
+    std::fprintf(stderr, "darmd render: %s\n", made.error().message.c_str());
     return 1;
   }
-  fs::path json = command.out;
-  json.replace_extension(".json");
-  if (std::FILE* file = std::fopen(json.c_str(), "w")) {
-    std::fprintf(file, "%s\n", report->dump(2).c_str());
+  if (!*made) return lifecycle::kInterrupted;
+  const auto& report = **made;
+  const std::string text = report.dump(2);
+  if (std::FILE* file = std::fopen(PictureFiles(command.out).with(".json").c_str(), "w")) {
+    std::fprintf(file, "%s\n", text.c_str());
     std::fclose(file);
   }
   if (command.json) {
-    std::printf("%s\n", report->dump(2).c_str());
+    std::printf("%s\n", text.c_str());
   } else {
-    std::printf("%s: %u samples per pixel, own PSNR %.2f dB, %.2f M paths/s\n", command.out.c_str(),
-                (*report)["spp"].get<unsigned>(), (*report)["reference_psnr"].get<double>(),
-                (*report)["paths_per_second"].get<double>() * 1e-6);
+    std::printf("%s: %u samples per pixel, own PSNR %s, %.2f M paths/s\n", command.out.c_str(),
+                report["spp"].get<unsigned>(), decibel_words(report["reference_psnr"].get<double>()).c_str(),
+                report["paths_per_second"].get<double>() * 1e-6);
   }
   return 0;
 }

@@ -12,6 +12,7 @@
 #include "daemon/commands.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/lifecycle/service_notifier.hpp"
+#include "daemon/lifecycle/stop_count.hpp"
 #include "daemon/lifecycle/stop_deadline.hpp"
 #include "daemon/lifecycle/stop_signals.hpp"
 #include "daemon/observe/log.hpp"
@@ -38,10 +39,6 @@ class StopRequest {
     std::unique_lock lock(mutex_);
     while (!changed_.wait_for(lock, interval, [this] { return asked_; })) alive();
     return why_;
-  }
-  [[nodiscard]] bool asked() {
-    const std::lock_guard lock(mutex_);
-    return asked_;
   }
   [[nodiscard]] bool failed() {
     const std::lock_guard lock(mutex_);
@@ -81,9 +78,10 @@ void tell_certificate(const Addresses& at) {
 int run(const ServeCommand& command) {
   const auto notifier = lifecycle::ServiceNotifier::from_environment();
   StopRequest stop;
-  const lifecycle::StopSignals signals([&stop](int number) {
-    if (stop.asked()) std::_Exit(130);  // the second one means now
-    stop.ask(number == 2 ? "interrupted" : "asked to stop", false);
+  const lifecycle::StopSignals signals([&stop, count = lifecycle::StopCount()](int number) mutable {
+    const auto wish = count.signal(std::chrono::steady_clock::now());
+    if (wish == lifecycle::StopCount::Wish::kLeave) std::_Exit(lifecycle::kInterrupted);
+    if (wish == lifecycle::StopCount::Wish::kStop) stop.ask(number == 2 ? "interrupted" : "asked to stop", false);
   });
   observe::set_up_log(command.config.log.level, command.config.log.json);
 

@@ -248,6 +248,7 @@ Result<std::shared_ptr<const Scene>> SceneBuilder::build(const LightSetup& setup
   if (!materials) return std::unexpected(materials.error());
   scene_->materials = std::move(*materials);
   built_.resize(document_.model.meshes.size());
+  gltf::warn_of_lights(document_);
   const auto nodes = gltf::place_nodes(document_);
   if (!nodes) return std::unexpected(nodes.error());
   for (const gltf::PlacedNode& placed : *nodes)

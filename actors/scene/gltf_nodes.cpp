@@ -143,6 +143,42 @@ Result<std::vector<glm::dmat4>> read_instancing(Document& document, const tinygl
   return out;
 }
 
+namespace {
+
+constexpr double kMaxIntensity = 1e12;       // lux, candela: sums and squares of such light stay finite
+constexpr std::size_t kMostLightsNamed = 8;  // in warnings
+constexpr std::size_t kChannels = 3;
+
+double intensity_of(const tinygltf::Light& light, std::size_t channel) {
+  return (channel < light.color.size() ? light.color[channel] : 1.0) * light.intensity;
+}
+
+// Null: it can be taken as it is.
+const char* fault_of_intensity(const tinygltf::Light& light) {
+  const char* fault = nullptr;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    const double value = intensity_of(light, c);
+    if (!std::isfinite(value)) return "has an intensity that is not finite; it is taken as 0, no light";
+    if (value < 0.0) fault = "has a negative intensity; it is taken as 0, no light";
+    if (value > kMaxIntensity && fault == nullptr) fault = "has an intensity over 1e12; it is taken as 1e12";
+  }
+  return fault;
+}
+
+}  // namespace
+
+void warn_of_lights(Document& document) {
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < document.model.lights.size(); ++i) {
+    const tinygltf::Light& light = document.model.lights[i];
+    const char* fault = fault_of_intensity(light);
+    if (fault == nullptr || ++found > kMostLightsNamed) continue;
+    document.warnings.push_back(named("light", i, light.name) + " " + fault);
+  }
+  if (found > kMostLightsNamed)
+    document.warnings.push_back(std::to_string(found - kMostLightsNamed) + " more lights have such intensities");
+}
+
 Result<std::optional<PlacedLight>> read_light(const Document& document, const PlacedNode& placed) {
   const tinygltf::Node& node = document.model.nodes[placed.node];
   const auto* extension = find_extension(node.extensions, "KHR_lights_punctual");
@@ -163,10 +199,10 @@ Result<std::optional<PlacedLight>> read_light(const Document& document, const Pl
   }
   out.position = glm::dvec3(placed.to_world[3]);
   out.light.direction = glm::vec3(forward(placed.to_world));
-  for (int c = 0; c < 3; ++c) {
-    const double color = static_cast<std::size_t>(c) < in.color.size() ? in.color[static_cast<std::size_t>(c)] : 1.0;
-    const double value = color * in.intensity;
-    out.light.intensity[c] = static_cast<float>(std::isfinite(value) ? std::clamp(value, 0.0, 1e12) : 0.0);
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    const double value = intensity_of(in, c);
+    out.light.intensity[static_cast<int>(c)] =
+        static_cast<float>(std::isfinite(value) ? std::clamp(value, 0.0, kMaxIntensity) : 0.0);
   }
   out.light.range = std::isfinite(in.range) && in.range > 0.0 ? static_cast<float>(std::min(in.range, 1e12)) : 0.0f;
   const double outer = std::isfinite(in.spot.outerConeAngle)

@@ -20,12 +20,16 @@ Result<std::vector<PlacedNode>> place_nodes(const Document& document);
 /// Transforms of the instances of a node with EXT_mesh_gpu_instancing, relative to the node; one identity without it.
 Result<std::vector<glm::dmat4>> read_instancing(Document& document, const tinygltf::Node& node);
 
-/// Light of a node in file coordinates (Light::object is left 0), if it carries one.
+/// Light of a node in file coordinates (Light::object is left 0), if it carries one. Its intensity is brought into
+/// 0..1e12.
 struct PlacedLight {
   Light light;
   glm::dvec3 position{0.0};
 };
 Result<std::optional<PlacedLight>> read_light(const Document& document, const PlacedNode& placed);
+
+/// Warns of lights whose intensity read_light() changes: below 0, not finite, too large.
+void warn_of_lights(Document& document);
 
 /// Perspective camera of a node, if it carries one.
 std::optional<NamedCamera> read_camera(Document& document, const PlacedNode& placed);

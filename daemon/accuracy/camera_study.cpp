@@ -6,6 +6,7 @@
 
 #include "daemon/accuracy/replay.hpp"
 #include "daemon/reference_file.hpp"
+#include "daemon/reference_words.hpp"
 
 namespace darm::accuracy {
 namespace {
@@ -55,16 +56,14 @@ Result<bool> CameraStudy::prepare() {
   reference.state_file = reference_file(options_.state_dir, *world_.transport, reference);
   reference.warn = options_.warn;
   reference.progress = [this](const renderer::ReferenceProgress& p) {
-    char words[96];
-    std::snprintf(words, sizeof words, ": reference, %.1f of %.1f dB, %u samples per pixel", p.own_psnr,
-                  options_.reference_psnr, p.spp);
-    options_.progress(0, options_.name + words);
+    options_.progress(0, options_.name + ": reference to " + decibel_words(options_.reference_psnr) + ", " +
+                             reference_words(p, kMostReferenceSamples));
     return !options_.stopped();
   };
   auto made = renderer::render_reference(*world_.transport, reference);
   if (!made) return std::unexpected(made.error());
   if (made->stopped) return false;
-  own_psnr_ = made->own_psnr;
+  own_psnr_ = std::min(made->own_psnr, kMostDecibels);
   reference_ = std::make_unique<const ShownHalves>(Halves{std::move(made->half_a), std::move(made->half_b)});
   return true;
 }
@@ -179,8 +178,10 @@ Result<CameraStudy::Outcome> CameraStudy::measure_codec(const Variant& variant) 
   auto m = begin(variant);
   m.curve = recoded->curve;
   m.figures[figure::kBytes] = recoded->bytes;
-  m.figures[figure::kFirstBytes] = recoded->first_bytes;
-  m.figures[figure::kFirstCodecDb] = recoded->first_codec_db;
+  if (recoded->first) {
+    m.figures[figure::kFirstBytes] = recoded->first->bytes;
+    m.figures[figure::kFirstCodecDb] = recoded->first->codec_db;
+  }
   m.figures[figure::kLastCodecDb] = recoded->last_codec_db;
   m.figures[figure::kEncodeSeconds] = recoded->encode_seconds;
   return Outcome{std::move(m), {}};

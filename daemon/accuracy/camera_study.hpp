@@ -34,6 +34,9 @@ class CameraStudy {
   /// `world`: of the base density, without a store; must outlive it.
   CameraStudy(const World& world, CameraStudyOptions options);
 
+  /// False: no pixel counts, so every error would be none.
+  [[nodiscard]] bool sees_anything() const { return counted_share(view_.counted()) > 0; }
+
   /// Renders the reference, or takes the one that is kept. False: stopped.
   [[nodiscard]] Result<bool> prepare();
   [[nodiscard]] CameraFacts facts() const;

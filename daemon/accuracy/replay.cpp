@@ -84,7 +84,6 @@ Result<Replayed> replay(const Recording& recording, const atlas::Layout& layout,
 
 Result<Recoded> recode(const Recording& recording, const atlas::Layout& layout, const SoftwareView& view,
                        const ShownHalves& reference, const config::StreamConfig& stream, float crf, unsigned threads) {
-  const auto first_tiles = std::find_if(recording.frames.begin(), recording.frames.end(), has_tiles);
   if (!has_picture(recording)) return fail("run: it has no picture");
   encoder::H264Settings settings;
   settings.width = settings.height = stream.phystex;
@@ -112,16 +111,16 @@ Result<Recoded> recode(const Recording& recording, const atlas::Layout& layout, 
     if (!planes) return std::unexpected(planes.error());
     state.apply(frame.encoded->key, frame.encoded->edits, frame.writes);
     out.bytes += static_cast<double>(packet->size());
-    const bool first = &frame == &*first_tiles, last = &frame == &recording.frames.back();
+    const bool first = !out.first && view.share_of_tiles(state, threads) >= kMostlyTiles;
+    const bool last = &frame == &recording.frames.back();
     if (!first && !last) continue;
     state.set_picture({});
     const auto before = view.draw(state, threads);
     state.set_picture(std::move(*planes));
     const auto after = view.draw(state, threads);
     const double codec_db = psnr_between(after, before, view.counted());
-    if (first) out.first_bytes = static_cast<double>(packet->size());
-    (first ? out.first_codec_db : out.last_codec_db) = codec_db;
-    if (first && last) out.last_codec_db = codec_db;
+    if (first) out.first = {out.bytes, codec_db};
+    if (last) out.last_codec_db = codec_db;
     out.curve.push_back({frame.seconds, psnr_to(after, reference, view.counted()), frame.samples});
   }
   out.encode_seconds = spent / static_cast<double>(recording.frames.size());

@@ -1,6 +1,7 @@
 // A recorded run, looked at afterwards: the error of its pictures over time, and the same light through other codecs.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "daemon/accuracy/picture_error.hpp"
@@ -30,11 +31,20 @@ struct Replayed {
 [[nodiscard]] Result<Replayed> replay(const Recording& recording, const atlas::Layout& layout, const SoftwareView& view,
                                       const ShownHalves& reference, const ReplayOptions& options);
 
+/// What the codec makes of a view is looked at first when this share of it is tiles. Before that it shows CoarseTex,
+/// which no codec of tiles can harm: what the very first tiles lose of it says nothing. Never is it all tiles: what
+/// covers a few pixels stays coarse.
+inline constexpr double kMostlyTiles = 0.5;
+
 struct Recoded {
-  std::vector<Point> curve;  ///< first and last picture
+  /// The view after the codec, and what had been sent by then.
+  struct First {
+    double bytes = 0;
+    double codec_db = 0;  ///< against before the codec
+  };
+  std::vector<Point> curve;    ///< that first picture, if there is one, and the last
+  std::optional<First> first;  ///< nothing: there were never tiles enough
   double bytes = 0;
-  double first_bytes = 0;
-  double first_codec_db = 0;  ///< the drawn view after the codec against before
   double last_codec_db = 0;
   double encode_seconds = 0;  ///< mean of one frame
 };

@@ -20,6 +20,7 @@ std::string result_key(const KeyParts& p, const Variant& v) {
        << stream.updates_per_second << ' ' << stream.phystex << ' ' << stream.view_phystex << ' ' << stream.max_writes
        << ' ' << stream.crf << ' ' << stream.crf_finest << ' ' << stream.preset << ' ' << stream.chroma_444 << '|'
        << v.private_layer << ' ' << v.crf;
+  if (v.method == Method::kCodec) text << '|' << kCodecMethodVersion;
   std::uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
   for (const char c : text.str()) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
   char out[17];

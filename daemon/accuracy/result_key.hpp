@@ -11,6 +11,8 @@ namespace darm::accuracy {
 
 /// Bumped when the same variant would be measured in another way: earlier results are then not used.
 inline constexpr int kMethodVersion = 1;
+/// The same for codec variants alone.
+inline constexpr int kCodecMethodVersion = 2;
 
 struct KeyParts {
   std::uint64_t scene_hash = 0;

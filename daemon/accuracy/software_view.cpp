@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -66,20 +67,39 @@ SoftwareView::SoftwareView(const atlas::Layout& layout, const renderer::trace::R
   });
 }
 
-glm::vec3 SoftwareView::colour(const Look& look, const ClientState& state) const {
+SoftwareView::Found SoftwareView::find(const Look& look, const ClientState& state) const {
   const PatchId patch{look.patch};
-  const int last = layout_.coarse_level();
-  for (int i = 0; i <= kMaxCoarserLevels && look.level + i <= last; ++i) {
+  for (int i = 0; i <= kMaxCoarserLevels && look.level + i <= layout_.coarse_level(); ++i) {
     const int level = look.level + i;
     const auto texel = layout_.texel_at(patch, level, look.uv);
     const auto tile = tile_scheduler::tile_holding(layout_, level, texel);
-    const auto slot = state.slot_of(tile);
-    if (slot == kNoSlot) continue;
-    const auto across = layout_.levels[static_cast<std::size_t>(level)].tiles_x;
-    const glm::vec2 corner(tile.index() % across, tile.index() / across);
-    return state.slot_colour(slot, texel - corner * float{kTileSize} + 1.0f);
+    if (const auto slot = state.slot_of(tile); slot != kNoSlot) return {slot, tile, texel};
   }
-  return state.coarse_colour(layout_.texel_at(patch, last, look.uv));
+  return {};
+}
+
+glm::vec3 SoftwareView::colour(const Look& look, const ClientState& state) const {
+  const auto [slot, tile, texel] = find(look, state);
+  if (slot == kNoSlot)
+    return state.coarse_colour(layout_.texel_at(PatchId{look.patch}, layout_.coarse_level(), look.uv));
+  const auto across = layout_.levels[static_cast<std::size_t>(tile.level())].tiles_x;
+  const glm::vec2 corner(tile.index() % across, tile.index() / across);
+  return state.slot_colour(slot, texel - corner * float{kTileSize} + 1.0f);
+}
+
+double SoftwareView::share_of_tiles(const ClientState& state, unsigned threads) const {
+  std::atomic<std::size_t> from_tiles{0}, all{0};
+  atlas::parallel_for(viewport_.height, threads, [&](std::size_t y) {
+    std::size_t found = 0, looked = 0;
+    for (std::size_t pixel = y * viewport_.width; pixel < (y + 1) * viewport_.width; ++pixel) {
+      if (counted_[pixel] == 0) continue;
+      for (std::size_t k = 0; k < kSamples; ++k, ++looked)
+        found += find(looks_[pixel * kSamples + k], state).slot != kNoSlot ? 1u : 0u;
+    }
+    from_tiles += found;
+    all += looked;
+  });
+  return all > 0 ? static_cast<double>(from_tiles) / static_cast<double>(all) : 0;
 }
 
 renderer::Picture SoftwareView::draw(const ClientState& state, unsigned threads) const {

@@ -26,6 +26,8 @@ class SoftwareView {
                const Viewport& viewport, unsigned threads);
 
   [[nodiscard]] const PixelMask& counted() const { return counted_; }
+  /// Share of the samples that count which draw() would take from tiles, 0..1: the others lie in CoarseTex.
+  [[nodiscard]] double share_of_tiles(const ClientState& state, unsigned threads) const;
   /// The picture, linear and display-referred: four samples a pixel, each from its sharp level or up to three coarser
   /// ones, else from CoarseTex. Pixels that are not counted are black. `state.has_coarse()` must hold.
   [[nodiscard]] renderer::Picture draw(const ClientState& state, unsigned threads) const;
@@ -37,6 +39,13 @@ class SoftwareView {
     std::int32_t level = -1;  // -1: nothing that counts
     glm::vec2 uv{0.0f};
   };
+  // A tile that is there, and how far from its sharp level.
+  struct Found {
+    SlotIndex slot = kNoSlot;
+    TileId tile;
+    glm::vec2 texel{0.0f};
+  };
+  [[nodiscard]] Found find(const Look& look, const ClientState& state) const;
   [[nodiscard]] glm::vec3 colour(const Look& look, const ClientState& state) const;
 
   const atlas::Layout& layout_;

@@ -1,19 +1,22 @@
 #include "daemon/accuracy/study.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <map>
 #include <memory>
-#include <system_error>
 #include <utility>
 
 #include "actors/scene/effect_plan.hpp"
 #include "daemon/accuracy/camera_study.hpp"
+#include "daemon/accuracy/machine_speed.hpp"
 #include "daemon/accuracy/report/results_file.hpp"
 #include "daemon/accuracy/report/text.hpp"
 #include "daemon/accuracy/result_key.hpp"
 #include "daemon/accuracy/variants.hpp"
 #include "daemon/scene_setup.hpp"
 #include "daemon/world.hpp"
+#include "daemon/writable.hpp"
 
 namespace darm::accuracy {
 namespace {
@@ -22,6 +25,9 @@ namespace fs = std::filesystem;
 
 /// Seconds that drawing and comparing come to, for the bar.
 constexpr double kOverhead = 5;
+
+/// Of looking at the machine's speed, before and after each variant.
+constexpr double kSpeedSeconds = 0.1;
 
 using Kept = std::map<std::string, Measurement>;  // by key
 
@@ -42,6 +48,10 @@ Result<std::vector<NamedView>> views_of(const StudyOptions& options, const scene
     views.push_back({options.config.cameras.empty() ? "start" : options.config.cameras.front().name,
                      start_camera(options.config, scene)});
   return views;
+}
+
+std::string blind_words(const std::string& camera) {
+  return "camera " + camera + " sees no opaque surface, only sky or what is seen through";
 }
 
 double worth_of(const Variant& v) {
@@ -71,6 +81,9 @@ class Runner {
   [[nodiscard]] fs::path results_file() const { return options_.out / "results.jsonl"; }
   [[nodiscard]] std::string key_of(const NamedView& view, const Variant& variant) const;
   [[nodiscard]] CameraStudyOptions camera_options(const NamedView& view) const;
+  [[nodiscard]] double speed_now(const NamedView& view) const {
+    return rays_per_second(*world_.rays, view.camera, threads_, kSpeedSeconds);
+  }
   [[nodiscard]] Result<void> measure_view(const NamedView& view, const std::vector<Variant>& variants);
   void describe();
   void collect(const std::vector<NamedView>& views, const std::vector<Variant>& all);
@@ -79,7 +92,11 @@ class Runner {
   Progress& progress_;
   const World& world_;
   unsigned threads_;
+  double began_ =
+      std::floor(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count());
   Kept kept_;
+  std::vector<std::string> blind_;  // cameras that see nothing
+  bool alone_ = false;              // there is one camera
   Study study_;
 };
 
@@ -107,6 +124,11 @@ CameraStudyOptions Runner::camera_options(const NamedView& view) const {
 // The reference is made, or read, even where nothing is left to measure: the report names its accuracy.
 Result<void> Runner::measure_view(const NamedView& view, const std::vector<Variant>& variants) {
   CameraStudy camera(world_, camera_options(view));
+  if (!camera.sees_anything()) {
+    blind_.push_back(view.name);
+    if (!alone_) progress_.warn(blind_words(view.name) + "; it is left out");
+    return {};
+  }
   const auto prepared = camera.prepare();
   if (!prepared) return std::unexpected(prepared.error());
   study_.stopped = study_.stopped || !*prepared;
@@ -119,6 +141,9 @@ Result<void> Runner::measure_view(const NamedView& view, const std::vector<Varia
       progress_.done(worth_of(variant), words_of(kept_[key]) + " (measured before)");
       continue;
     }
+    study_.stopped = options_.stopped && options_.stopped();  // not every variant asks
+    if (study_.stopped) return {};
+    const double before = speed_now(view);
     auto outcome = camera.measure(variant);
     if (!outcome) return std::unexpected(outcome.error().within(view.name + ": " + variant.name));
     if (!outcome->impossible.empty()) {
@@ -131,6 +156,8 @@ Result<void> Runner::measure_view(const NamedView& view, const std::vector<Varia
     }
     auto& m = *outcome->measurement;
     m.key = key;
+    m.figures[figure::kRunBegan] = began_;
+    m.figures[figure::kRaysPerSecond] = (before + speed_now(view)) / 2;
     if (auto saved = append_result(results_file(), m); !saved) return saved;
     ++study_.measured;
     progress_.done(worth_of(variant), words_of(m));
@@ -153,17 +180,20 @@ void Runner::describe() {
 }
 
 void Runner::collect(const std::vector<NamedView>& views, const std::vector<Variant>& all) {
-  for (const auto& view : views)
+  for (const auto& view : views) {
+    if (std::ranges::find(blind_, view.name) != blind_.end()) continue;  // results from before it was looked at
     for (const auto& variant : all)
       if (const auto it = kept_.find(key_of(view, variant)); it != kept_.end()) {
         study_.report.measurements.push_back(it->second);
         study_.report.measurements.back().camera = view.name;  // the same view may have had another name
       }
+  }
 }
 
 Result<Study> Runner::run() {
   const auto views = views_of(options_, *world_.scene);
   if (!views) return std::unexpected(views.error());
+  alone_ = views->size() == 1;
   auto earlier = load_results(results_file());
   if (!earlier) return std::unexpected(earlier.error());
   for (auto& m : *earlier) kept_[m.key] = std::move(m);
@@ -179,6 +209,8 @@ Result<Study> Runner::run() {
     if (auto done = measure_view(view, *variants); !done) return std::unexpected(done.error());
     if (study_.stopped) break;
   }
+  if (blind_.size() == views->size())
+    return fail((alone_ ? "" : "no camera is left: ") + blind_words(blind_.front()) + "; name another with --cameras");
   collect(*views, all);
   return std::move(study_);
 }
@@ -186,9 +218,9 @@ Result<Study> Runner::run() {
 }  // namespace
 
 Result<Study> run_study(const StudyOptions& options, Progress& progress) {
-  std::error_code error;
-  fs::create_directories(options.out, error);
-  if (error) return fail(options.out.string() + ": cannot be made: " + error.message());
+  if (auto ok = make_writable_folder(options.config.state.dir); !ok) return std::unexpected(ok.error());
+  if (auto ok = make_writable_folder(options.out); !ok) return std::unexpected(ok.error());
+  if (auto ok = check_writable_file(options.out / "results.jsonl"); !ok) return std::unexpected(ok.error());
   progress.show(0, "loading the scene");
   const auto world = load_world(options.config, thread_count(options.config));
   if (!world) return std::unexpected(world.error());

@@ -8,9 +8,9 @@
 
 #include "actors/types/camera.hpp"
 #include "actors/types/error.hpp"
-#include "daemon/accuracy/progress.hpp"
 #include "daemon/accuracy/report/measurement.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/progress.hpp"
 
 namespace darm::accuracy {
 

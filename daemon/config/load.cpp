@@ -1,5 +1,6 @@
 #include "daemon/config/load.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <fstream>
@@ -24,8 +25,8 @@ constexpr std::int64_t kMaxBytes = std::int64_t{1} << 50;
 void read_path(TableReader& reader, std::string_view key, std::filesystem::path& out,
                const std::filesystem::path& file) {
   std::string text;
-  reader.text(key, text, 4096);
-  if (text.empty()) return;
+  if (!reader.text(key, text, 4096)) return;
+  if (text.empty()) return reader.fault(key, "is empty; leave the key out where there is no file");
   const std::filesystem::path path(text);
   out = path.is_absolute() ? path : (file.parent_path() / path).lexically_normal();
 }
@@ -202,6 +203,22 @@ Loaded checked(Config config, std::vector<Fault> faults) {
   return config;
 }
 
+// As the listeners read it: numbers alone, since a name may stand for several addresses, or for none tomorrow.
+bool is_address(const std::string& text) {
+  in6_addr any{};
+  const auto scope = text.find('%');  // fe80::1%eth0
+  return inet_pton(AF_INET, text.c_str(), &any) == 1 || inet_pton(AF_INET6, text.substr(0, scope).c_str(), &any) == 1;
+}
+
+void check_address(const std::string& address, std::vector<Fault>& faults) {
+  if (address.empty())
+    faults.push_back({kSum, 0, "listen.address", "must not be empty; 0.0.0.0 is every address of this machine"});
+  else if (!is_address(address))
+    faults.push_back(
+        {kSum, 0, "listen.address",
+         fmt::format("\"{}\" is not an IP address; 0.0.0.0 is every address of this machine", printable(address))});
+}
+
 void check_names(const std::vector<Pose>& poses, const std::string& list, std::vector<Fault>& faults) {
   std::set<std::string> seen;
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -241,8 +258,7 @@ std::vector<Fault> check(const Config& config) {
   if (config.tls.certificate.empty() != config.tls.key.empty())
     faults.push_back({kSum, 0, config.tls.key.empty() ? "tls.key" : "tls.certificate",
                       "is missing: name both files, or neither for a certificate of our own"});
-  if (config.listen.address.empty())
-    faults.push_back({kSum, 0, "listen.address", "must not be empty; 0.0.0.0 is every address of this machine"});
+  check_address(config.listen.address, faults);
   if (config.state.dir.empty()) faults.push_back({kSum, 0, "state.dir", "must not be empty"});
   return faults;
 }

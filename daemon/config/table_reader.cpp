@@ -25,15 +25,14 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-// A key as it may stand in a message.
+}  // namespace
+
 std::string printable(std::string_view key) {
   std::string text(key.substr(0, 60));
   for (char& c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
   return text;
 }
-
-}  // namespace
 
 TableReader::TableReader(ReadReport& report, const TomlTable* table, int line, std::string prefix)
     : report_(report), table_(table), line_(line), prefix_(std::move(prefix)) {}
@@ -130,14 +129,16 @@ void TableReader::texts(std::string_view key, std::vector<std::string>& out, std
     out = std::move(read);
 }
 
-void TableReader::text(std::string_view key, std::string& out, std::size_t max_length) {
+bool TableReader::text(std::string_view key, std::string& out, std::size_t max_length) {
   const TomlValue* value = ask(key);
-  if (value == nullptr) return;
+  if (value == nullptr) return false;
   const auto* s = std::get_if<std::string>(&value->data);
-  if (s == nullptr || s->size() > max_length || s->find('\0') != std::string::npos)
+  if (s == nullptr || s->size() > max_length || s->find('\0') != std::string::npos) {
     fault_at(*value, key, fmt::format("{} is not a text of at most {} bytes", value->shown(), max_length));
-  else
-    out = *s;
+    return false;
+  }
+  out = *s;
+  return true;
 }
 
 void TableReader::choice(std::string_view key, std::string& out, std::initializer_list<std::string_view> allowed) {

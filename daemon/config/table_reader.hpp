@@ -21,6 +21,9 @@ struct ReadReport {
   std::vector<std::string>* known = nullptr;
 };
 
+/// A key, or another text of the user's, as it may stand in a message.
+[[nodiscard]] std::string printable(std::string_view key);
+
 /// A key that is absent leaves its variable as it is; a faulty one is reported and does too. finish() once at the end.
 class TableReader {
  public:
@@ -37,7 +40,8 @@ class TableReader {
   void number(std::string_view key, double& out, double low, double high);
   /// The same, or "auto", which sets 0.
   void number_or_auto(std::string_view key, double& out, double low, double high);
-  void text(std::string_view key, std::string& out, std::size_t max_length);
+  /// True: it is there, and sound.
+  bool text(std::string_view key, std::string& out, std::size_t max_length);
   /// A list of at most `most` texts.
   void texts(std::string_view key, std::vector<std::string>& out, std::size_t most, std::size_t max_length);
   void choice(std::string_view key, std::string& out, std::initializer_list<std::string_view> allowed);

@@ -6,8 +6,14 @@
 
 namespace darm::lifecycle {
 
-/// Make one first thing in main, before any other thread: it blocks the signals for the process's threads, which
-/// inherit the mask. SIGPIPE is ignored (a closed socket is an error value), SIGHUP counts as a stop.
+/// First thing in main, before any other thread, which inherits the mask: stop signals wait for a StopSignals. One that
+/// comes while the command line is read would otherwise end the process without a word.
+void hold_stop_signals();
+/// For a command that a signal may end where it stands: those that wait do so now.
+void release_stop_signals();
+
+/// Make one first thing in a command, before any other thread: it holds the signals. SIGPIPE is ignored (a closed
+/// socket is an error value). SIGHUP counts as a stop, but for a process that was started to ignore it (nohup).
 class StopSignals {
  public:
   /// `on_signal(number)` is called for each signal, one at a time; the second one usually means "now".

@@ -12,6 +12,8 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
@@ -83,21 +85,36 @@ std::string in_ipv4(const std::string& address) {
   return std::memcmp(&parsed, &in6addr_loopback, sizeof parsed) == 0 ? "127.0.0.1" : "";
 }
 
+// Can anything listen at this IPv4 address? Asked once the HTTP server could not, which does not say why.
+bool is_of_this_machine(const std::string& address) {
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  if (inet_pton(AF_INET, address.c_str(), &at.sin_addr) != 1) return false;
+  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool bound = fd >= 0 && bind(fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
+  if (fd >= 0) close(fd);
+  return bound;
+}
+
 Result<std::unique_ptr<prometheus::Exposer>> make_exposer(const std::string& address, std::uint16_t port) {
   const std::string where = host_and_port(address, port);
-  const char* advice = address.find(':') == std::string::npos
-                           ? "is the port taken? set listen.metrics_port (-1: off)"
-                           : "the HTTP server may have been built without IPv6: set listen.address to \"::\", or "
-                             "listen.metrics_port to -1 (off)";
+  const auto advice = [&address] {
+    if (address.find(':') != std::string::npos)
+      return "the HTTP server may have been built without IPv6: set listen.address to \"::\", or listen.metrics_port "
+             "to "
+             "-1 (off)";
+    return is_of_this_machine(address) ? "is the port taken? set listen.metrics_port (-1: off)"
+                                       : "listen.address is no address of this machine; 0.0.0.0 is every one";
+  };
   try {
     auto exposer = std::make_unique<prometheus::Exposer>(
         std::vector<std::string>{"listening_ports", where, "num_threads", kThreads, "request_timeout_ms",
                                  kRequestTimeoutMs, "enable_keep_alive", "no"});
     const auto ports = exposer->GetListeningPorts();
     if (!ports.empty() && ports.front() > 0) return exposer;
-    return fail(fmt::format("{}: metrics cannot be served there; {}", where, advice));
+    return fail(fmt::format("{}: metrics cannot be served there; {}", where, advice()));
   } catch (const std::exception& e) {
-    return fail(fmt::format("{}: metrics cannot be served there; {} ({})", where, advice, e.what()));
+    return fail(fmt::format("{}: metrics cannot be served there; {} ({})", where, advice(), e.what()));
   }
 }
 

@@ -3,6 +3,7 @@ import csv
 import json
 import signal
 import subprocess
+import time
 import unittest
 import xml.etree.ElementTree as xml
 from pathlib import Path
@@ -23,9 +24,9 @@ class Accuracy(unittest.TestCase):
         self.addCleanup(folder.__exit__)
         self.out = self.folder / "out"
 
-    def command(self, *more):
-        return [BIN / "darmd", "accuracy", "--config", SET_UP, "--cameras", "hall", "--size", "128x72", "--q", "16",
-                "--seconds", "2", "--reference-psnr", "33", "--state-dir", self.state, "--out", self.out,
+    def command(self, *more, cameras=("hall",), state=None):
+        return [BIN / "darmd", "accuracy", "--config", SET_UP, "--cameras", *cameras, "--size", "128x72", "--q", "16",
+                "--seconds", "2", "--reference-psnr", "33", "--state-dir", state or self.state, "--out", self.out,
                 *more]
 
     def study(self, *more):
@@ -50,6 +51,9 @@ class Accuracy(unittest.TestCase):
         for finer, coarser in (("crf 14", "crf 18"), ("crf 18", "crf 23"), ("crf 23", "crf 28")):
             self.assertGreater(figures[finer]["first_codec_db"], figures[coarser]["first_codec_db"])
             self.assertGreater(figures[finer]["first_bytes"], figures[coarser]["first_bytes"])
+        # The first picture is one of tiles, which the codec harms; what is coarse would be the same before and after it.
+        self.assertLess(figures["crf 28"]["first_codec_db"], 55)
+        self.assertGreater(figures["crf 14"]["first_bytes"], 4000)
         self.assertLess(figures["all indirect light"]["without_db"], figures["all but 4 bounces"]["without_db"])
         self.assertLess(figures["all indirect light"]["seconds_without"], figures["all indirect light"]["seconds_with"])
         self.check_files(report)
@@ -92,8 +96,67 @@ class Accuracy(unittest.TestCase):
         self.assertFalse((self.out / ".darmd-accuracy-run").exists())
         done = len(results.read_text().splitlines())
         self.assertLess(done, 3)
-        _, said = self.study("--only", "sky,balanced,filter")
+        report, said = self.study("--only", "sky,balanced,filter")
         self.assertIn(f"{3 - done} measured, {done} from before", said)
+        runs = {m["figures"]["run_began"] for m in report["measurements"]}
+        self.assertEqual(len(runs), 2)
+        self.assertIn("* Measured in another run", (self.out / "accuracy.html").read_text())
+
+    def test_a_stop_waits_for_no_further_variant(self):
+        running = subprocess.Popen(self.command("--only", "codec"), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True)
+        results = self.out / "results.jsonl"
+        wait_until(lambda: results.exists() and results.stat().st_size > 0, 100, "a first result")
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 130, said)
+        self.assertLess(len(results.read_text().splitlines()), 5, said)
+
+    def test_one_wish_to_stop_that_is_sent_twice_is_one(self):
+        # As timeout(1) sends it: to the process, and to its group.
+        running = subprocess.Popen(self.command("--only", "balanced"), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True)
+        wait_until(self.out.exists, 100, "a folder")
+        for _ in range(2):
+            running.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        _, said = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 130, said)
+        self.assertIn("goes on where it stopped", said)
+
+    def test_a_camera_that_sees_nothing_is_left_out_and_alone_refused(self):
+        nowhere = "0,900,0 0,1000,0 60"
+        done = subprocess.run(self.command("--only", "sky", cameras=[nowhere]), capture_output=True, text=True,
+                              timeout=100)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertIn(f"camera {nowhere} sees no opaque surface", done.stderr)
+        self.assertFalse((self.out / "accuracy.json").exists())
+        done = subprocess.run(self.command("--only", "sky", cameras=[nowhere, "hall"]), capture_output=True,
+                              text=True, timeout=200)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(f"warning: camera {nowhere} sees no opaque surface", done.stderr)
+        report = json.loads((self.out / "accuracy.json").read_text())
+        self.assertEqual([c["name"] for c in report["cameras"]], ["hall"])
+        self.assertEqual({m["camera"] for m in report["measurements"]}, {"hall"})
+
+    def test_a_report_that_cannot_be_written_is_refused_before_the_work(self):
+        state = self.folder / "state"
+        for blocked in (self.out, self.out / "pictures", self.out / "accuracy.html", self.out / "results.jsonl"):
+            blocked.parent.mkdir(exist_ok=True)
+            if blocked.suffix:
+                blocked.mkdir()  # where a file is to be
+            else:
+                blocked.write_text("")  # where a folder is to be
+            done = subprocess.run(self.command(state=state), capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 1)
+            self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+            self.assertIn(f"darmd accuracy: {blocked}: ", done.stderr)
+            self.assertEqual(list(state.glob("*")), [])
+            if blocked.suffix:
+                blocked.rmdir()
+            else:
+                blocked.unlink()
 
     def test_what_cannot_be_done_is_one_clear_line(self):
         for more, words in ((("--only", "everything"), "groups are presets, q"), (("--cameras", "nowhere"), "nowhere")):

@@ -51,6 +51,10 @@ class Refusals(unittest.TestCase):
                 (PROBE + ["--camera", "0,0,0 1,1,1 nan", *more], "field of view"),
             ])
 
+    def test_addresses(self):
+        self.check([(SERVE + ["--address", address], f'listen.address: "{address}" is not an IP address')
+                    for address in ("nonsense", "localhost", "127.0.0.1:9010")])
+
     def test_places(self):
         self.check([
             (PROBE + CAMERA + ["--out", "missing/x.png"], "folder missing does not exist"),

@@ -48,7 +48,7 @@ struct Measurement {
 namespace figure {
 inline constexpr const char* kLightDb = "light_db";                ///< the last picture without the codec
 inline constexpr const char* kBytes = "bytes";                     ///< of the whole stream
-inline constexpr const char* kFirstBytes = "first_bytes";          ///< of its first frame with tiles
+inline constexpr const char* kFirstBytes = "first_bytes";          ///< of it until the view is mostly tiles
 inline constexpr const char* kFirstCodecDb = "first_codec_db";     ///< that picture after the codec against before
 inline constexpr const char* kLastCodecDb = "last_codec_db";       ///< the last one likewise
 inline constexpr const char* kEncodeSeconds = "encode_seconds";    ///< mean of one frame
@@ -57,6 +57,8 @@ inline constexpr const char* kAtLeast = "at_least";                ///< 1: `with
 inline constexpr const char* kSecondsWith = "seconds_with";        ///< of one sample per pixel, with the effect
 inline constexpr const char* kSecondsWithout = "seconds_without";  ///< and without
 inline constexpr const char* kStoppedEarly = "finished_after";     ///< seconds after which nothing changed any more
+inline constexpr const char* kRunBegan = "run_began";              ///< when the process began, seconds since 1970
+inline constexpr const char* kRaysPerSecond = "rays_per_second";   ///< of the machine, just before and after
 }  // namespace figure
 
 /// One effect of the plan, as the scene calls for it.

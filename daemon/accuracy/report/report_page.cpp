@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/accuracy/report/curve.hpp"
+#include "daemon/accuracy/report/origin.hpp"
 #include "daemon/accuracy/report/svg_chart.hpp"
 #include "daemon/accuracy/report/tables.hpp"
 #include "daemon/accuracy/report/text.hpp"
@@ -53,14 +54,25 @@ std::string markdown_table(const Table& table) {
 }
 
 std::string facts_words(const Report& r) {
+  const auto when = Origins(r).when();
   return std::to_string(r.width) + " x " + std::to_string(r.height) + " pixels, q = " + exact_text(r.q) + ", " +
          count_text(static_cast<double>(r.triangles)) + " triangles, " + std::to_string(r.threads) +
-         (r.threads == 1 ? " thread, " : " threads, ") + seconds_text(r.seconds) + " s a run.";
+         (r.threads == 1 ? " thread, " : " threads, ") + seconds_text(r.seconds) + " s a run." +
+         (when.empty() ? "" : " " + when + ".");
 }
 
-std::string camera_words(const CameraFacts& camera) {
+// What the star of some rows means; empty where no row of this camera has one.
+std::string apart_words(const Report& report, const std::string& camera) {
+  const Origins origins(report);
+  const bool some = std::ranges::any_of(
+      report.measurements, [&](const Measurement& m) { return m.camera == camera && origins.is_apart(m); });
+  return some ? kApartWords : "";
+}
+
+std::string camera_words(const Report& report, const CameraFacts& camera) {
+  const auto apart = apart_words(report, camera.name);
   return ratio_text(100 * camera.counted) + " % of the pixels counted; the reference's own accuracy is " +
-         db_text(camera.reference_psnr) + " dB.";
+         db_text(camera.reference_psnr) + " dB." + (apart.empty() ? "" : " " + apart);
 }
 
 // The sentence that somebody in a hurry reads.
@@ -68,6 +80,7 @@ std::string verdict(const Report& report, const std::string& camera) {
   const auto* ours = report.find(camera, Group::kPresets, kBalanced);
   const auto* plain = report.find(camera, Group::kFrames, kCameraFrames);
   if (ours == nullptr || ours->curve.empty()) return {};
+  const Origins origins(report);
   std::string out = "From nothing, the first picture is there after " + seconds_text(ours->curve.front().seconds) +
                     " s at " + db_text(ours->curve.front().db) + " dB, and after " +
                     seconds_text(ours->curve.back().seconds) + " s it is at " + db_text(ours->curve.back().db) + " dB.";
@@ -78,7 +91,8 @@ std::string verdict(const Report& report, const std::string& camera) {
   if (plain == nullptr || plain->curve.empty()) return out;
   const double db = std::floor(std::min(ours->curve.back().db, plain->curve.back().db));
   if (const auto ratio = time_ratio(plain->curve, ours->curve, db))
-    out += " Tracing camera frames takes " + ratio_text(*ratio) + " times as long to " + db_text(db) + " dB.";
+    out += " Tracing camera frames takes " + ratio_text(*ratio) + " times as long to " + db_text(db) + " dB" +
+           (origins.is_apart(*ours) || origins.is_apart(*plain) ? " *." : ".");
   return out;
 }
 
@@ -115,7 +129,7 @@ std::string html_page(const Report& report) {
   out += "<p class=\"soft\">" + xml_text(facts_words(report)) + "</p>\n";
   for (const auto& camera : report.cameras) {
     out += "<h2>Camera " + xml_text(camera.name) + "</h2>\n<p>" + xml_text(verdict(report, camera.name)) + "</p>\n";
-    out += "<p class=\"soft\">" + xml_text(camera_words(camera)) + "</p>\n";
+    out += "<p class=\"soft\">" + xml_text(camera_words(report, camera)) + "</p>\n";
     for (const auto& section : sections_of(report, camera.name)) {
       out += "<h3>" + xml_text(section.heading) + "</h3>\n<p>" + xml_text(section.words) + "</p>\n";
       if (!section.chart.series.empty()) out += "<figure>" + svg_chart(section.chart, false) + "</figure>\n";
@@ -132,7 +146,7 @@ std::string markdown_page(const Report& report, const std::string& prefix) {
   std::string out = "## " + markdown_text(report.scene) + "\n\n" + markdown_text(facts_words(report)) + "\n";
   for (const auto& camera : report.cameras) {
     out += "\n### Camera " + markdown_text(camera.name) + "\n\n" + markdown_text(verdict(report, camera.name)) + " " +
-           markdown_text(camera_words(camera)) + "\n";
+           markdown_text(camera_words(report, camera)) + "\n";
     for (const auto& section : sections_of(report, camera.name)) {
       out += "\n#### " + markdown_text(section.heading) + "\n\n" + markdown_text(section.words) + "\n";
       if (!section.chart.series.empty())

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/accuracy/report/curve.hpp"
+#include "daemon/accuracy/report/origin.hpp"
 #include "daemon/accuracy/report/text.hpp"
 
 namespace darm::accuracy {
@@ -56,7 +57,21 @@ std::string against_frames(const Measurement& m, const Measurement* plain) {
   return ratio ? ratio_text(*ratio) + " times, to " + db_text(*db) + " dB" : std::string(kNothing);
 }
 
-Table ends_table(const Curves& curves, const Measurement* plain) {
+// Says of each row where it comes from, if one of them is apart. `from`: the rows' results, in order.
+void add_origins(Table& table, const Curves& from, const Origins& origins) {
+  if (std::none_of(from.begin(), from.end(), [&](const Measurement* m) { return origins.is_apart(*m); })) return;
+  table.columns.emplace_back("measured");
+  for (std::size_t i = 0; i < from.size(); ++i) table.rows[i].push_back(origins.words_of(*from[i]));
+}
+
+Curves group_of_camera(const Report& report, const std::string& camera, Group group) {
+  Curves out;
+  for (const auto& m : report.measurements)
+    if (m.camera == camera && m.group == group) out.push_back(&m);
+  return out;
+}
+
+Table ends_table(const Curves& curves, const Measurement* plain, const Origins& origins) {
   Table table{
       "Where each variant ends",
       {"variant", "dB", "after, s", "first picture, s", "dB without codec", "samples", "stream", "camera frames take"},
@@ -65,12 +80,13 @@ Table ends_table(const Curves& curves, const Measurement* plain) {
     const auto& last = m->curve.back();
     const std::string unit = m == plain ? " a pixel" : "";
     const auto done = figure_of(*m, figure::kStoppedEarly);
-    table.rows.push_back({m->variant, db_text(last.db),
+    table.rows.push_back({origins.name_of(*m), db_text(last.db),
                           seconds_text(done.value_or(last.seconds)) + (done ? ", done" : ""),
                           seconds_text(m->curve.front().seconds), or_nothing(figure_of(*m, figure::kLightDb), db_text),
                           count_text(last.samples) + unit, or_nothing(figure_of(*m, figure::kBytes), bytes_text),
                           against_frames(*m, plain)});
   }
+  add_origins(table, curves, origins);
   return table;
 }
 
@@ -101,9 +117,9 @@ std::optional<double> price_of(const Measurement& m, int to) {
 }
 
 // Time to each whole decibel, and in brackets what it cost beyond the one before.
-Table price_table(const Curves& curves) {
+Table price_table(const Curves& curves, const Origins& origins) {
   Table table{"Seconds to each whole decibel (and the price of that decibel)", {"dB"}, {}};
-  for (const auto* m : curves) table.columns.push_back(m->variant);
+  for (const auto* m : curves) table.columns.push_back(origins.name_of(*m));
   const auto range = decibels_of(curves);
   for (int db = range ? range->first : 0; range && db <= range->second; ++db) {
     std::vector<std::string> row{std::to_string(db)};
@@ -117,8 +133,9 @@ Table price_table(const Curves& curves) {
 }
 
 // What the plain alternative asks for each decibel, beside ours.
-Table alternative_table(const Measurement& ours, const Measurement& plain) {
-  Table table{"Price of each further decibel: the atlas and camera frames",
+Table alternative_table(const Measurement& ours, const Measurement& plain, const Origins& origins) {
+  const char* apart = origins.is_apart(ours) || origins.is_apart(plain) ? " *" : "";
+  Table table{std::string("Price of each further decibel: the atlas and camera frames") + apart,
               {"dB", "atlas, s", "its price, s", "camera frames, s", "their price, s", "camera frames / atlas"},
               {}};
   const auto range = decibels_of({&ours, &plain});
@@ -129,21 +146,22 @@ Table alternative_table(const Measurement& ours, const Measurement& plain) {
   return table;
 }
 
-Table codec_table(const Report& report, const std::string& camera) {
+Table codec_table(const Curves& curves, const Origins& origins) {
   Table table{"The same light through the codec",
-              {"quality", "codec, first picture, dB", "codec, last picture, dB", "dB to the reference", "first picture",
-               "whole stream", "a frame, ms"},
+              {"quality", "codec, first picture, dB", "codec, last picture, dB", "dB to the reference",
+               "until the first picture", "whole stream", "a frame, ms"},
               {}};
-  for (const auto& m : report.measurements) {
-    if (m.camera != camera || m.group != Group::kCodec) continue;
+  for (const auto* result : curves) {
+    const auto& m = *result;
     const auto milliseconds = figure_of(m, figure::kEncodeSeconds);
-    table.rows.push_back({m.variant, or_nothing(figure_of(m, figure::kFirstCodecDb), db_text),
+    table.rows.push_back({origins.name_of(m), or_nothing(figure_of(m, figure::kFirstCodecDb), db_text),
                           or_nothing(figure_of(m, figure::kLastCodecDb), db_text),
                           m.curve.empty() ? kNothing : db_text(m.curve.back().db),
                           or_nothing(figure_of(m, figure::kFirstBytes), bytes_text),
                           or_nothing(figure_of(m, figure::kBytes), bytes_text),
                           milliseconds ? seconds_text(*milliseconds * 1e3) : kNothing});
   }
+  add_origins(table, curves, origins);
   return table;
 }
 
@@ -159,16 +177,16 @@ std::string saving_words(const Measurement& m) {
   return ratio_text(100 * (*with - *without) / *with) + " %";
 }
 
-Table effects_table(const Report& report, const std::string& camera) {
+Table effects_table(const Curves& curves, const Origins& origins) {
   Table table{
       "Leaving an effect out, measured on camera frames",
       {"left out", "picture without it, dB", "a sample per pixel without, s", "with, s", "its share of the time"},
       {}};
-  for (const auto& m : report.measurements) {
-    if (m.camera != camera || m.group != Group::kEffects) continue;
-    table.rows.push_back({m.variant, without_words(m), or_nothing(figure_of(m, figure::kSecondsWithout), seconds_text),
-                          or_nothing(figure_of(m, figure::kSecondsWith), seconds_text), saving_words(m)});
-  }
+  for (const auto* m : curves)
+    table.rows.push_back({origins.name_of(*m), without_words(*m),
+                          or_nothing(figure_of(*m, figure::kSecondsWithout), seconds_text),
+                          or_nothing(figure_of(*m, figure::kSecondsWith), seconds_text), saving_words(*m)});
+  add_origins(table, curves, origins);
   return table;
 }
 
@@ -221,7 +239,8 @@ std::string words_of(Group group) {
       return "The same integrator tracing camera frames on the same threads.";
     case Group::kCodec:
       return "One recorded run of the balanced preset, coded again at each constant rate factor. Codec dB: the drawn "
-             "view after the codec against before.";
+             "view after the codec against before. The first picture is the first of which half is tiles: what is "
+             "coarser does not go through this codec.";
     default:
       return "The reference tracer with and without, eight samples a pixel each. The difference is taken between two "
              "pairs of independent halves, so that noise cancels; within two standard errors it is given as a bound. "
@@ -229,14 +248,15 @@ std::string words_of(Group group) {
   }
 }
 
-Chart chart_of(const Report& report, const std::string& camera, Group group, const Curves& curves) {
+Chart chart_of(const Report& report, const std::string& camera, Group group, const Curves& curves,
+               const Origins& origins) {
   Chart chart{id_of(report, camera, group),
               heading_of(group) + ", camera " + camera,
               "PSNR against the reference over seconds, logarithmic.",
               {}};
   for (const auto* m : curves) {
-    chart.series.push_back({m->variant, m->curve});
-    chart.description += " " + m->variant + ": " + db_text(m->curve.back().db) + " dB after " +
+    chart.series.push_back({origins.name_of(*m), m->curve});
+    chart.description += " " + origins.name_of(*m) + ": " + db_text(m->curve.back().db) + " dB after " +
                          seconds_text(m->curve.back().seconds) + " s.";
   }
   return chart;
@@ -248,22 +268,22 @@ std::vector<Section> sections_of(const Report& report, const std::string& camera
   std::vector<Section> sections;
   const auto* plain = frames(report, camera);
   const auto* ours = balanced(report, camera);
+  const Origins origins(report);
   for (int g = 0; g < kGroups; ++g) {
     const auto group = static_cast<Group>(g);
-    const bool measured = std::any_of(report.measurements.begin(), report.measurements.end(),
-                                      [&](const auto& m) { return m.camera == camera && m.group == group; });
-    if (!measured) continue;
+    const auto measured = group_of_camera(report, camera, group);
+    if (measured.empty()) continue;
     Section section{heading_of(group), words_of(group), {}, {}};
     if (group == Group::kCodec) {
-      section.tables.push_back(codec_table(report, camera));
+      section.tables.push_back(codec_table(measured, origins));
     } else if (group == Group::kEffects) {
-      section.tables.push_back(effects_table(report, camera));
+      section.tables.push_back(effects_table(measured, origins));
     } else if (const auto curves = curves_of(report, camera, group); !curves.empty()) {
-      section.chart = chart_of(report, camera, group, curves);
-      section.tables.push_back(ends_table(curves, plain));
+      section.chart = chart_of(report, camera, group, curves, origins);
+      section.tables.push_back(ends_table(curves, plain, origins));
       section.tables.push_back(group == Group::kFrames && ours != nullptr && plain != nullptr
-                                   ? alternative_table(*ours, *plain)
-                                   : price_table(curves));
+                                   ? alternative_table(*ours, *plain, origins)
+                                   : price_table(curves, origins));
     }
     sections.push_back(std::move(section));
   }

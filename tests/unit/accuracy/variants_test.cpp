@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <set>
 
-#include "daemon/accuracy/progress.hpp"
 #include "daemon/accuracy/recording.hpp"
 #include "daemon/accuracy/result_key.hpp"
 
@@ -105,14 +104,6 @@ TEST(Recording, SettlesOnlyAfterATimeThatGrowsWithTheRun) {
   EXPECT_TRUE(has_settled(4.6, 1.5));
   EXPECT_FALSE(has_settled(30, 21));
   EXPECT_TRUE(has_settled(30, 19));
-}
-
-TEST(ProgressBar, FitsAndNeverLies) {
-  EXPECT_EQ(progress_bar(0.5, "words", 80), "[############------------]  50 %  words");
-  EXPECT_EQ(progress_bar(7, "", 80), progress_bar(1, "", 80));
-  EXPECT_EQ(progress_bar(0.0 / 0.0, "", 80), progress_bar(0, "", 80));
-  EXPECT_EQ(progress_bar(0.999, "", 80).find("100"), std::string::npos);
-  EXPECT_EQ(progress_bar(0.5, std::string(200, 'x'), 60).size(), 60u);
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   const std::vector<std::filesystem::path> files{kDocumented};
   const auto loaded = load(files);
   ASSERT_TRUE(loaded) << to_string(loaded.error());
-  const Config a = *loaded;
+  const Config& a = *loaded;
   const Config b;
   EXPECT_EQ(a.scene.file, b.scene.file);
   EXPECT_EQ(a.scene.q, b.scene.q);
@@ -120,6 +120,30 @@ TEST(DocumentedConfig, MentionsEveryKey) {
   EXPECT_GT(known.size(), 40u);
   for (const auto& name : known)
     EXPECT_TRUE(std::find(mentioned.begin(), mentioned.end(), name) != mentioned.end()) << name << " is not documented";
+}
+
+TEST(LoadConfig, AnEmptyPathIsAFaultAndNotAKeyThatIsLeftOut) {
+  for (const char* toml : {"[scene]\nfile = \"\"", "walkthrough = \"\"", "[tls]\nkey = \"\""}) {
+    const auto loaded = parse(toml, "a.toml");
+    ASSERT_FALSE(loaded) << toml;
+    EXPECT_NE(to_string(loaded.error()).find("is empty"), std::string::npos) << to_string(loaded.error());
+  }
+  EXPECT_EQ(to_string(parse("[scene]\nfile = \"\"", "a.toml").error()),
+            "a.toml:2: scene.file: is empty; leave the key out where there is no file");
+}
+
+TEST(LoadConfig, AnAddressIsOneInNumbers) {
+  Config config;
+  for (const char* good : {"0.0.0.0", "127.0.0.1", "::", "::1", "fe80::1%eth0"}) {
+    config.listen.address = good;
+    EXPECT_TRUE(check(config).empty()) << good;
+  }
+  for (const char* bad : {"nonsense", "localhost", "1.2.3", "1.2.3.4:80", "1.2.3.4%eth0", ":::", " 127.0.0.1"}) {
+    config.listen.address = bad;
+    const auto faults = to_string(check(config));
+    EXPECT_NE(faults.find("listen.address: \"" + std::string(bad) + "\" is not an IP address"), std::string::npos)
+        << faults;
+  }
 }
 
 TEST(LoadConfig, EvaluationSetUpsLoad) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "daemon/lifecycle/service_notifier.hpp"
+#include "daemon/lifecycle/stop_count.hpp"
 #include "daemon/lifecycle/stop_deadline.hpp"
 #include "daemon/lifecycle/stop_signals.hpp"
 
@@ -100,6 +101,39 @@ TEST(StopSignalsTest, SignalsArriveAsCalls) {
   EXPECT_EQ(first.get_future().get(), SIGTERM);
   kill(getpid(), SIGINT);
   EXPECT_EQ(second.get_future().get(), SIGINT);
+}
+
+TEST(StopSignalsTest, ASignalFromBeforeIsNotLost) {
+  hold_stop_signals();
+  kill(getpid(), SIGINT);
+  std::promise<int> first;
+  const StopSignals signals([&](int number) { first.set_value(number); });
+  EXPECT_EQ(first.get_future().get(), SIGINT);
+}
+
+TEST(StopSignalsTest, WhoIgnoresHangUpsGoesOn) {
+  const auto before = signal(SIGHUP, SIG_IGN);
+  {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_UNBLOCK, &all, nullptr);
+    std::promise<int> first;
+    const StopSignals signals([&](int number) { first.set_value(number); });
+    kill(getpid(), SIGHUP);
+    kill(getpid(), SIGTERM);
+    EXPECT_EQ(first.get_future().get(), SIGTERM);
+  }
+  signal(SIGHUP, before);
+}
+
+TEST(StopCountTest, OneWishSentTwiceIsOneWish) {
+  using Wish = StopCount::Wish;
+  const auto now = std::chrono::steady_clock::now();
+  StopCount count;
+  EXPECT_EQ(count.signal(now), Wish::kStop);
+  EXPECT_EQ(count.signal(now), Wish::kNothingNew);
+  EXPECT_EQ(count.signal(now + 200ms), Wish::kNothingNew);
+  EXPECT_EQ(count.signal(now + 1500ms), Wish::kLeave);
 }
 
 TEST(StopSignalsTest, EndsWithoutASignal) {

@@ -149,6 +149,14 @@ TEST(PrometheusSinkTest, AnyAndLoopbackOfIpv6AreServedOneWayOrTheOther) {
   EXPECT_TRUE(has(elsewhere.error().message, "CivetServer")) << "the reason as it was given";
 }
 
+TEST(PrometheusSinkTest, AnAddressOfAnotherMachineIsNamedAndNotThePort) {
+  const auto exposed = PrometheusSink().expose("203.0.113.7", 0);  // for documentation: nobody's
+  ASSERT_FALSE(exposed);
+  EXPECT_TRUE(has(exposed.error().message, "203.0.113.7")) << exposed.error().message;
+  EXPECT_TRUE(has(exposed.error().message, "listen.address is no address of this machine")) << exposed.error().message;
+  EXPECT_FALSE(has(exposed.error().message, "metrics_port")) << exposed.error().message;
+}
+
 TEST(PrometheusSinkTest, WhoConnectsAndSaysNothingKeepsNobodyOut) {
   auto sink = std::make_unique<PrometheusSink>();
   ASSERT_TRUE(sink->expose("127.0.0.1", 0));

@@ -244,6 +244,35 @@ TEST(GltfLoader, ReadsMaterialsLightsAndMarks) {
   EXPECT_EQ(scene.cameras[0].camera.position, glm::dvec3(1, 2, 3));
 }
 
+std::vector<std::string> warnings_of_light(const std::string& members, std::size_t lights = 1) {
+  SmallScene s;
+  s.nodes = R"([{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":0}}}])";
+  s.more_members = R"(,"extensions":{"KHR_lights_punctual":{"lights":[)";
+  for (std::size_t i = 0; i < lights; ++i)
+    s.more_members += (i == 0 ? "" : ",") + (R"({"type":"point","name":"lamp",)" + members) + "}";
+  s.more_members += "]}}";
+  const auto loaded = load(s);
+  EXPECT_TRUE(loaded) << loaded.error().message;
+  return loaded ? (*loaded)->warnings : std::vector<std::string>();
+}
+
+TEST(GltfLoader, NamesALightWhoseIntensityItChanges) {
+  EXPECT_THAT(warnings_of_light(R"("intensity":1e12)"), testing::IsEmpty());
+  EXPECT_THAT(warnings_of_light(R"("intensity":-5)"),
+              testing::ElementsAre("light 0 'lamp' has a negative intensity; it is taken as 0, no light"));
+  EXPECT_THAT(warnings_of_light(R"("color":[1,-1,0],"intensity":5)"),
+              testing::ElementsAre(HasSubstr("negative intensity")));
+  EXPECT_THAT(warnings_of_light(R"("intensity":1e15)"), testing::ElementsAre(HasSubstr("taken as 1e12")));
+  EXPECT_THAT(warnings_of_light(R"("color":[1e200,1,1],"intensity":1e200)"),
+              testing::ElementsAre(HasSubstr("not finite")));
+}
+
+TEST(GltfLoader, DoesNotNameLightsWithoutEnd) {
+  const auto warnings = warnings_of_light(R"("intensity":-5)", 100);
+  EXPECT_LT(warnings.size(), 20u);
+  EXPECT_THAT(warnings.back(), HasSubstr("more lights"));
+}
+
 TEST(GltfLoader, ReadsOnlyInsideItsFolder) {
   const auto folder = std::filesystem::temp_directory_path() / "darm_scene_sandbox";
   std::filesystem::remove_all(folder);
