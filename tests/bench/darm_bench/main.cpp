@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tests/bench/darm_bench/effects.hpp"
+#include "tests/bench/darm_bench/frame_streaming.hpp"
 #include "tests/bench/darm_bench/raytrace.hpp"
 #include "tests/bench/darm_bench/time_to_quality.hpp"
 
@@ -67,6 +68,11 @@ int main(int argc, char** argv) {
   auto* time = app.add_subcommand("time-to-quality", "seconds until a picture is good, beside tracing camera frames");
   declare_time_to_quality(*time, quality);
   time->add_flag("--json", json, "one line of JSON");
+  darm::bench::TimeToQualityOptions streams;
+  auto* frames =
+      app.add_subcommand("frame-streaming", "1, 4 and 8 clients, beside a server that sends each its pictures");
+  declare_time_to_quality(*frames, streams);
+  frames->add_flag("--json", json, "one line of JSON");
   darm::bench::RaytraceOptions rays;
   auto* trace = app.add_subcommand("raytrace", "rays a second inside the renderer, beside the ray library alone");
   declare_raytrace(*trace, rays);
@@ -77,6 +83,7 @@ int main(int argc, char** argv) {
   effects->add_flag("--json", json, "one line of JSON");
   CLI11_PARSE(app, argc, argv);
   if (effects->parsed()) return print(darm::bench::effects(plan), json);
+  if (frames->parsed()) return print(darm::bench::frame_streaming(streams), json);
   if (trace->parsed()) return print(darm::bench::raytrace(rays), json);
   return print(darm::bench::time_to_quality(quality), json);
 }
