@@ -25,8 +25,8 @@ void MemberLink::changed(LinkState state, double bytes_per_second, Microseconds 
 }
 
 void MemberLink::lost_pictures(Microseconds now) {
+  if (!lost_at_ || now - *lost_at_ >= options_.keeps_up) lost_since_ = now;
   lost_at_ = now;
-  if (!lost_since_) lost_since_ = now;
 }
 
 void MemberLink::sent(std::size_t bytes, Microseconds now) {
@@ -43,7 +43,8 @@ bool MemberLink::keeps_up(double key_bytes, Microseconds now) {
     slow_since_ = now;
   const bool slow = slow_since_ && now - *slow_since_ >= options_.slow_for;
   const bool loses = lost_since_ && *lost_at_ - *lost_since_ >= options_.behind;
-  if (!slow && !loses && !stands(now)) return true;
+  const bool fast = rate_ * options_.key_seconds > key_bytes * options_.clearly_fast;
+  if (!slow && !loses && (fast || !stands(now))) return true;
   trouble_at_ = now;
   return false;
 }

@@ -13,6 +13,7 @@ namespace darm::tile_scheduler {
 
 struct LinkOptions {
   Microseconds stands = 1'000'000;     ///< a link without room for so long does not keep up,
+  double clearly_fast = 4;             ///< unless it is faster than it must be by this factor: then it will go on,
   Microseconds behind = 2'000'000;     ///< nor does a client that has lost pictures now and so long ago,
   double key_seconds = 1.5;            ///< nor a link that a key frame of a shared stream takes longer
   Microseconds slow_for = 500'000;     ///< (as it has been for this time, because measures err)

@@ -241,7 +241,7 @@ TEST_F(SharedStreams, ASlowLinkHasAStreamThatFollowsItAndTheOthersDoNotNotice) {
 
 TEST_F(SharedStreams, AFullLinkInAStreamOfManyIsWaitedForByNobody) {
   both_look_ahead();
-  scheduler_.tell(LinkChanged(bob_, LinkState::kFull, 50e6));
+  scheduler_.tell(LinkChanged(bob_, LinkState::kFull, 1.5e6));
   system_.run_until_idle();
   const auto frames = heard_.frames[first_].size();
   run(5, 2);

@@ -39,12 +39,17 @@ TEST_F(MemberLinkTest, OneThatAKeyFrameWouldTakeLongIsSetApartBeforeItHasToBear)
 }
 
 TEST_F(MemberLinkTest, OneThatStandsIsSetApart) {
-  be(LinkState::kFull, 10e6);
+  be(LinkState::kFull, 1.5e6);
   EXPECT_FALSE(run(kSecond / 2)) << "a moment may happen to anybody";
-  be(LinkState::kFree, 10e6);
+  be(LinkState::kFree, 1.5e6);
   EXPECT_FALSE(run(kSecond / 2));
-  be(LinkState::kFull, 10e6);
+  be(LinkState::kFull, 1.5e6);
   EXPECT_TRUE(run(2 * kSecond));
+}
+
+TEST_F(MemberLinkTest, AFastOneThatStallsIsLeftWhereItIs) {
+  be(LinkState::kFull, 10e6);
+  EXPECT_FALSE(run(9 * kSecond)) << "apart it would cost a stream, and a key frame to come back";
 }
 
 TEST_F(MemberLinkTest, LoadingTheSceneIsNoTrouble) {
@@ -54,7 +59,9 @@ TEST_F(MemberLinkTest, LoadingTheSceneIsNoTrouble) {
 
 TEST_F(MemberLinkTest, OneThatLosesPicturesNowAndAgainIsSetApart) {
   link.lost_pictures(now);
-  EXPECT_FALSE(run(3 * kSecond)) << "once may happen to anybody";
+  EXPECT_FALSE(run(61 * kSecond)) << "once may happen to anybody";
+  link.lost_pictures(now);
+  EXPECT_FALSE(run(3 * kSecond)) << "or once a minute";
   link.lost_pictures(now);
   EXPECT_TRUE(run(kSecond));
 }
