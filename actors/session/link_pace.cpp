@@ -24,9 +24,10 @@ Microseconds LinkPace::expected(std::uint64_t bytes) const {
 bool LinkPace::ping_due(std::size_t bytes, Microseconds now) const {
   if (deaf(now) || pings_.size() >= kMostPings) return false;
   if (!pinged_at_ || now - *pinged_at_ >= kPingEvery) return true;
+  if (bytes < kTellingBytes / 8) return false;
   if (rate_ <= 0) return pings_.empty() || bytes >= kTellingBytes;
   const auto unanswered = (pings_.empty() ? 0 : written_ - arrived_) + bytes;
-  return bytes >= kTellingBytes / 8 && expected(unanswered) >= kWorthKnowing;
+  return expected(unanswered) >= kWorthKnowing;
 }
 
 // Not in the very first write, because clients expect their welcome first.

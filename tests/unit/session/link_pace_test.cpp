@@ -131,6 +131,15 @@ TEST(LinkPace, AFastLineIsHardlyPingedAndNeverFull) {
   EXPECT_LE(line.pings, 8);
 }
 
+TEST(LinkPace, SmallAnswersAreNotPingedOneByOne) {
+  Line line(100e6, kMs);
+  for (int i = 0; i < 100; ++i) {
+    line.write(60);
+    line.run(100 * kMs);
+  }
+  EXPECT_LE(line.pings, 6);
+}
+
 TEST(LinkPace, AClientThatDoesNotKnowPingsIsLeftAlone) {
   LinkPace pace;
   EXPECT_TRUE(pace.write(100'000, 0).behind);
