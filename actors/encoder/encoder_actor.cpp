@@ -15,6 +15,8 @@ Microseconds micros(const runtime::Executor& executor) {
 }
 
 constexpr std::chrono::milliseconds kTellAgainAfter{20};
+constexpr int kMostTries = 3;           // at a key frame of a limited size
+constexpr std::size_t kEditBytes = 10;  // of a page edit as it is sent, about
 
 // FrameDone must arrive, or the stream stands still: a full mailbox is tried again until it takes it.
 void tell_done(runtime::Executor& executor, const runtime::Ref<tile_scheduler::Inbox>& scheduler,
@@ -56,6 +58,7 @@ struct EncoderActor::Job {
   Microseconds encoded = 0;
   Microseconds busy = 0;  // processor time of it all; the codec has one thread, ours
   bool settled = true;    // the same picture again would not be finer
+  bool limited = false;   // it would have been finer without its limit of bytes
   std::string error;      // empty: frame is good
 };
 
@@ -113,24 +116,7 @@ void EncoderActor::run(Pipeline& pipeline, Job& job, const runtime::Executor& ex
         if (!w.image || !pipeline.picture->write(w.slot, *w.image)) job.error = "a write names no slot or no image";
       }
       job.composed = micros(executor);
-      if (!pipeline.encoder) {
-        auto made = H264Encoder::create(pipeline.settings);
-        if (made) {
-          pipeline.encoder = std::move(*made);
-        } else {
-          job.error = made.error().message;
-        }
-      }
-      if (job.error.empty()) {
-        pipeline.encoder->set_crf(pipeline.quality.next(frame.key, frame.error, job.composed));
-        job.settled = pipeline.quality.settled();
-        auto bytes = pipeline.encoder->encode(pipeline.picture->view(), frame.key);
-        if (bytes) {
-          frame.h264 = std::move(*bytes);
-        } else {
-          job.error = bytes.error().message;
-        }
-      }
+      if (job.error.empty()) code(pipeline, job);
     }
     frame.edits = std::move(job.command.edits);
   } catch (const std::exception& e) {
@@ -141,14 +127,48 @@ void EncoderActor::run(Pipeline& pipeline, Job& job, const runtime::Executor& ex
   job.busy = (executor.thread_time() - busy_before).count();
 }
 
+// A key frame that is too large for its link is coded again, coarser.
+void EncoderActor::code(Pipeline& pipeline, Job& job) {
+  auto& frame = *job.frame;
+  auto& quality = pipeline.quality;
+  for (int tries = 0; tries == 0 || (quality.too_large() && tries < kMostTries); ++tries) {
+    const float crf = quality.next(frame.key, frame.error, job.composed, job.command.most_bytes);
+    // libx264 makes a key frame as fine as the frames before it were, whatever the factor; a new one as it is told.
+    if (frame.key && quality.limited()) pipeline.encoder.reset();
+    if (!pipeline.encoder) {
+      pipeline.settings.crf = crf;
+      auto made = H264Encoder::create(pipeline.settings);
+      if (!made) {
+        job.error = made.error().message;
+        return;
+      }
+      pipeline.encoder = std::move(*made);
+    }
+    pipeline.encoder->set_crf(crf);
+    auto bytes = pipeline.encoder->encode(pipeline.picture->view(), frame.key);
+    if (!bytes) {
+      job.error = bytes.error().message;
+      return;
+    }
+    frame.h264 = std::move(*bytes);
+    quality.coded(frame.h264.size(), job.composed);
+  }
+  job.settled = quality.settled();
+  job.limited = quality.limited();
+}
+
 void EncoderActor::on(PictureEncoded&& event) {
   if (!job_ || job_->command.frame != event.frame) return;
   const auto job = std::exchange(job_, nullptr);
   key_required_ = !job->error.empty();
   record(*job);
   if (job->error.empty()) publish(*job);
-  tell_done(executor(), scheduler_,
-            tile_scheduler::FrameDone(options_.stream, event.frame, job->error.empty(), job->settled, job->busy));
+  tile_scheduler::FrameDone done(options_.stream, event.frame, job->error.empty(), job->settled, job->busy);
+  done.key = job->frame->key;
+  done.limited = job->limited;
+  done.bytes = job->frame->h264.size() + job->frame->lossless.size() * sizeof(TileImage::rgb) +
+               job->frame->edits.size() * kEditBytes;
+  tell_done(executor(), scheduler_, done);
   while (!job_ && !waiting_.empty()) {
     auto next = std::move(waiting_.front());
     waiting_.pop_front();

@@ -50,6 +50,7 @@ class EncoderActor : public runtime::Actor<Inbox> {
   struct Job;
   void begin(ComposeFrame&& command);
   static void run(Pipeline& pipeline, Job& job, const runtime::Executor& executor);
+  static void code(Pipeline& pipeline, Job& job);
   void publish(Job& job);
   void record(const Job& job);
 

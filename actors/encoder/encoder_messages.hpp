@@ -1,6 +1,7 @@
 // The encoder's inbox. Plain values only: peers may include this file and nothing else of the room.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <variant>
@@ -45,6 +46,7 @@ struct ComposeFrame {
   std::vector<ViewAnswer> answers;
   float error = 0;                ///< estimated RMS display error of all views of the stream, 0..1
   std::vector<ViewError> errors;  ///< of each; a session that is not named has the stream's
+  std::size_t most_bytes = 0;     ///< it should not be larger, at the cost of quality; 0: as large as quality asks for
   ComposeFrame(FrameNumber number, bool is_key) : frame(number), key(is_key) {}
 };
 

@@ -44,25 +44,21 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
   auto& mine = track(layer);
   const auto oldest = std::find_if(items_.begin(), items_.end(),
                                    [&](const Item& i) { return i.kind == Kind::kPicture && i.frame->layer == layer; });
-  const bool late = oldest != items_.end() && now - oldest->since > limits_.media_age;
+  const bool late = oldest != items_.end() && waited(*oldest, now) > limits_.media_age;
   // A single picture may be of any size; only a queue of them is bounded.
   const bool full = mine.waiting > 0 && mine.waiting_bytes + size_of(*frame) > limits_.media_bytes;
-  if (late || full) drop_pictures(layer);
+  if (late || full) drop_pictures(layer, late ? Drop::kOld : Drop::kFull);
   // A key frame makes what waits before it useless, and stands for it.
-  if (frame->key && mine.waiting > 0) drop_pictures(layer);
+  if (frame->key && mine.waiting > 0) drop_pictures(layer, Drop::kReplaced);
   if (!frame->key && frame->stream != mine.stream && !mine.refused) {
     await_key(mine, now);
-    ++pictures_dropped_;
-    keep_answer(answer);
-    return false;
+    return turn_away(answer, Drop::kElsewhere);
   }
   const bool follows = !mine.key_needed && frame->stream == mine.stream && frame->frame == mine.newest + 1;
   if (bulk_waiting_ > 0 || (!frame->key && !follows)) {
     if (frame->key) mine.key_asked.reset();
     mine.key_needed = mine.refused = true;
-    ++pictures_dropped_;
-    keep_answer(answer);
-    return false;
+    return turn_away(answer, bulk_waiting_ > 0 ? Drop::kLoading : Drop::kKeyNeeded);
   }
   mine.key_needed = mine.refused = false;
   mine.key_asked.reset();
@@ -72,6 +68,22 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
   ++mine.waiting;
   items_.push_back({Kind::kPicture, {}, frame, answer, 0, now});
   return true;
+}
+
+bool SendQueue::turn_away(const ViewAnswer& answer, Drop why) {
+  note(why);
+  keep_answer(answer);
+  return false;
+}
+
+// Without the time in which a key frame went out before it.
+Microseconds SendQueue::waited(const Item& item, Microseconds now) const {
+  return key_under_way_ ? 0 : now - std::max(item.since, key_sent_at_);
+}
+
+void SendQueue::sent(Microseconds now) {
+  under_way_since_.reset();
+  if (std::exchange(key_under_way_, false)) key_sent_at_ = now;
 }
 
 // Whoever comes to a stream is made a key frame without being asked, together with others who came. It is asked for
@@ -106,7 +118,7 @@ void SendQueue::attach_lost_answer(ViewAnswer& answer) {
   lost_answer_ = {};
 }
 
-void SendQueue::drop_pictures(StreamLayer layer) {
+void SendQueue::drop_pictures(StreamLayer layer, Drop why) {
   const auto goes = [layer](const Item& i) {
     if (i.kind == Kind::kPicture) return i.frame->layer == layer;
     return i.kind == Kind::kNoChange && layer == StreamLayer::kShared;
@@ -114,7 +126,7 @@ void SendQueue::drop_pictures(StreamLayer layer) {
   for (const auto& i : items_) {
     if (!goes(i)) continue;
     keep_answer(i.answer);
-    if (i.kind == Kind::kPicture) ++pictures_dropped_;
+    if (i.kind == Kind::kPicture) note(why);
   }
   std::erase_if(items_, goes);
   auto& mine = track(layer);
@@ -123,15 +135,15 @@ void SendQueue::drop_pictures(StreamLayer layer) {
   mine.key_needed = mine.refused = true;
 }
 
-Packets SendQueue::take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer) {
+Packets SendQueue::take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer, bool room) {
   if (under_way_since_) return {};
-  auto packets = background_next() ? take_background() : take_messages(now, make, make_answer);
+  auto packets = background_next(room) ? take_background() : take_messages(now, make, make_answer);
   if (!packets.empty()) under_way_since_ = now;
   return packets;
 }
 
-bool SendQueue::background_next() const {
-  if (background_.empty()) return false;
+bool SendQueue::background_next(bool room) const {
+  if (background_.empty() || !room) return false;
   return items_.empty() || (picture_went_ && items_.front().kind == Kind::kPicture);
 }
 
@@ -177,6 +189,7 @@ Packet SendQueue::take_first(Microseconds now, const MakePicture& make, const Ma
     case Kind::kCoarse:
       return std::move(item.packet);
     case Kind::kPicture:
+      key_under_way_ = item.frame->key;
       --track(item.frame->layer).waiting;
       track(item.frame->layer).waiting_bytes -= size_of(*item.frame);
       if (item.frame->layer == StreamLayer::kShared) attach_lost_answer(item.answer);

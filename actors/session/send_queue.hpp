@@ -1,8 +1,10 @@
 // What a session still has to send, in order; decides which pictures are dropped when the client cannot keep up.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
@@ -14,13 +16,27 @@
 namespace darm::session {
 
 struct SendLimits {
-  std::size_t media_bytes = 4u << 20;        ///< pictures waiting behind another picture
-  Microseconds media_age = 500'000;          ///< age at which a waiting picture is too old to be of use
+  std::size_t media_bytes = 4u << 20;  ///< pictures waiting behind another picture
+  /// Time behind others at which a waiting picture is too old to be of use. What a key frame takes does not count: on a
+  /// slow line that is longer, and whoever drops what follows it needs the next one.
+  Microseconds media_age = 500'000;
   std::size_t control_bytes = 16u << 20;     ///< control messages waiting
   Microseconds grace = 15'000'000;           ///< a write that takes longer than this: the client does not read
   std::size_t write_bytes = 128u << 10;      ///< messages up to so many bytes together are one write
   std::size_t background_bytes = 64u << 10;  ///< the same for the background, which others wait for
 };
+
+/// Why a picture was not sent.
+enum class Drop : std::uint8_t {
+  kOld,        ///< waited too long
+  kFull,       ///< too many bytes waited
+  kReplaced,   ///< a key frame came that stands for it
+  kLoading,    ///< the scene still went out
+  kKeyNeeded,  ///< it builds on one that was not sent
+  kElsewhere,  ///< of another stream, whose key frame was still to come
+};
+inline constexpr std::array kDropNames{"old", "full", "replaced", "loading", "key_needed", "elsewhere"};
+using DropCounts = std::array<std::size_t, kDropNames.size()>;
 
 /// First in, first out, but: control messages and coarse textures overtake bulk, and the background goes when nothing
 /// else waits, or after each picture, so that neither keeps the other out. Messages go out several at a time, because
@@ -53,9 +69,11 @@ class SendQueue {
   /// turns a picture into bytes when its turn comes.
   using MakePicture = std::function<Packet(const std::shared_ptr<const EncodedFrame>&, const ViewAnswer&)>;
   using MakeNoChange = std::function<Packet(const NoChange&)>;
-  [[nodiscard]] Packets take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
+  /// `room`: the background may have its turn.
+  [[nodiscard]] Packets take(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer,
+                             bool room = true);
   /// The write under way is out.
-  void sent() { under_way_since_.reset(); }
+  void sent(Microseconds now);
 
   /// True when a key frame should be asked for: one is needed, there is room for it, and none was asked for lately.
   [[nodiscard]] bool ask_for_key(Microseconds now, StreamLayer layer = StreamLayer::kShared);
@@ -65,7 +83,17 @@ class SendQueue {
   /// Drops everything that waits; what is under way stays so.
   void clear();
   [[nodiscard]] bool idle() const { return items_.empty() && background_.empty() && !under_way_since_; }
-  [[nodiscard]] std::size_t pictures_dropped() const { return pictures_dropped_; }
+  /// What the first picture needs still waits.
+  [[nodiscard]] bool loading() const { return bulk_waiting_ > 0; }
+  /// Of pictures that wait.
+  [[nodiscard]] std::size_t media_bytes() const { return tracks_[0].waiting_bytes + tracks_[1].waiting_bytes; }
+  /// Since it was made, by reason.
+  [[nodiscard]] const DropCounts& drops() const { return drops_; }
+  [[nodiscard]] bool any_dropped() const {
+    return std::ranges::any_of(drops_, [](std::size_t n) { return n > 0; });
+  }
+  /// Pictures that were dropped because the client does not keep up.
+  [[nodiscard]] std::size_t overdue() const { return dropped(Drop::kOld) + dropped(Drop::kFull); }
 
  private:
   enum class Kind : std::uint8_t { kControl, kManifest, kBulk, kCoarse, kPicture, kNoChange };
@@ -92,11 +120,15 @@ class SendQueue {
   };
   static void await_key(Track& mine, Microseconds now);
   [[nodiscard]] Track& track(StreamLayer layer) { return tracks_[layer == StreamLayer::kView ? 1 : 0]; }
-  void drop_pictures(StreamLayer layer);
+  void drop_pictures(StreamLayer layer, Drop why);
+  bool turn_away(const ViewAnswer& answer, Drop why);
+  [[nodiscard]] Microseconds waited(const Item& item, Microseconds now) const;
+  void note(Drop why) { ++drops_[static_cast<std::size_t>(why)]; }
+  [[nodiscard]] std::size_t dropped(Drop why) const { return drops_[static_cast<std::size_t>(why)]; }
   void keep_answer(const ViewAnswer& answer);
   void attach_lost_answer(ViewAnswer& answer);
   void insert_before_bulk(Item item);
-  [[nodiscard]] bool background_next() const;
+  [[nodiscard]] bool background_next(bool room) const;
   [[nodiscard]] Packets take_background();
   [[nodiscard]] Packets take_messages(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
   [[nodiscard]] Packet take_first(Microseconds now, const MakePicture& make, const MakeNoChange& make_answer);
@@ -107,8 +139,10 @@ class SendQueue {
   bool picture_went_ = false;  // since the background had its turn
   std::size_t bulk_waiting_ = 0;
   std::size_t control_waiting_bytes_ = 0;
-  std::size_t pictures_dropped_ = 0;
+  DropCounts drops_{};
   std::optional<Microseconds> under_way_since_;
+  bool key_under_way_ = false;
+  Microseconds key_sent_at_ = 0;
   std::array<Track, 2> tracks_;
   ViewAnswer lost_answer_;  // sequence 0: none
 };

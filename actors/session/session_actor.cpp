@@ -61,6 +61,8 @@ void SessionActor::act(Actions&& actions) {
           using A = std::decay_t<decltype(a)>;
           if constexpr (std::is_same_v<A, Noted>) {
             around_->metrics->count("darm_session_events_total", 1, {{"what", a.what}});
+          } else if constexpr (std::is_same_v<A, PicturesDropped>) {
+            around_->metrics->count("darm_session_pictures_dropped_total", double(a.count), {{"reason", a.why}});
           } else if constexpr (std::is_same_v<A, encoder::CoarseWanted>) {
             around_->coarse.tell(a);
           } else if constexpr (std::is_same_v<A, tile_scheduler::SessionOpened>) {

@@ -14,6 +14,10 @@ constexpr std::uint32_t kSmallestPhysTex = 1024;
 constexpr std::uint32_t kLargestCoded = 4096;
 constexpr std::uint32_t kLargestLossless = 8192;
 
+// A link's rate is told again when it is another by this factor; above the second, bytes a second, it is of no matter.
+constexpr double kAnotherRate = 1.25;
+constexpr double kFastEnough = 16e6;
+
 Packet packet_of(const wire::Envelope& envelope) {
   Packet p;
   p.head = proto::frame(envelope);
@@ -24,6 +28,12 @@ Packet packet_of(SharedBytes bytes) {
   Packet p;
   p.body = std::move(bytes);
   return p;
+}
+
+Packet ping_packet(std::int64_t number) {
+  wire::Envelope envelope;
+  envelope.mutable_ping()->set_time_us(number);
+  return packet_of(envelope);
 }
 
 // What the client can take of what the server offers; 0: no private layer.
@@ -100,7 +110,8 @@ void SessionProtocol::on_envelope(const wire::Envelope& envelope, Microseconds n
     case Body::kPing:
       return on_ping(envelope.ping(), now);
     case Body::kPong:
-      return;
+      pace_.pong(envelope.pong().time_us(), now);
+      return tell_link(now, actions);
     case Body::BODY_NOT_SET:
       return;  // a message of a later minor version: ignored, like unknown fields
     default:
@@ -159,6 +170,7 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
   }
   actions.push_back(tile_scheduler::SessionOpened(id_, *format, target));
   actions.push_back(encoder::CoarseWanted(id_));
+  tell_link(now, actions);
 }
 
 // What is not a number above 0 asks for nothing.
@@ -260,8 +272,10 @@ Actions SessionProtocol::on_datagram(const wire::DatagramBody& body, Microsecond
 Actions SessionProtocol::on_frame(const FrameEncoded& event, Microseconds now) {
   Actions actions;
   if (state_ != State::kOpen || !event.frame) return actions;
-  if (!queue_.push_picture(event.frame, event.answer, now)) actions.push_back(Noted{"picture_dropped"});
+  queue_.push_picture(event.frame, event.answer, now);
   ask_for_keys(now, actions);
+  tell_link(now, actions);
+  tell_drops(actions);
   return actions;
 }
 
@@ -276,20 +290,46 @@ void SessionProtocol::on_coarse(const CoarseUpdated& event) {
 }
 
 void SessionProtocol::ask_for_keys(Microseconds now, Actions& actions) {
-  if (state_ != State::kOpen) return;
+  if (state_ != State::kOpen || pace_.full(0, now)) return;  // it would only wait
   for (const auto layer : {StreamLayer::kShared, StreamLayer::kView}) {
     if (!queue_.ask_for_key(now, layer)) continue;
-    const auto dropped = queue_.pictures_dropped();
-    const bool behind = dropped > std::exchange(dropped_told_, dropped);
+    const auto overdue = queue_.overdue();
+    const bool behind = overdue > std::exchange(overdue_told_, overdue);
     actions.push_back(tile_scheduler::KeyFrameWanted(id_, layer, behind));
+  }
+}
+
+// A link that is fast and free is not worth a word.
+void SessionProtocol::tell_link(Microseconds now, Actions& actions) {
+  using tile_scheduler::LinkState;
+  if (state_ != State::kOpen) return;
+  const auto state = queue_.loading()                        ? LinkState::kLoading
+                     : pace_.full(queue_.media_bytes(), now) ? LinkState::kFull
+                                                             : LinkState::kFree;
+  const double rate = pace_.bytes_per_second();
+  const bool another = rate > rate_told_ * kAnotherRate || rate * kAnotherRate < rate_told_;
+  const bool matters = std::min(rate, rate_told_) < kFastEnough;
+  if (state == link_told_ && !(another && matters)) return;
+  link_told_ = state;
+  rate_told_ = rate;
+  actions.push_back(tile_scheduler::LinkChanged(id_, state, rate));
+}
+
+void SessionProtocol::tell_drops(Actions& actions) {
+  for (std::size_t i = 0; i < drops_told_.size(); ++i) {
+    const auto count = queue_.drops()[i];
+    if (const auto before = std::exchange(drops_told_[i], count); count > before)
+      actions.push_back(PicturesDropped{kDropNames[i], count - before});
   }
 }
 
 Actions SessionProtocol::on_sent(Microseconds now) {
   Actions actions;
-  queue_.sent();
+  queue_.sent(now);
+  pace_.taken();
   // Pictures were turned away while geometry went out: now there is room.
-  if (queue_.pictures_dropped() > 0) ask_for_keys(now, actions);
+  if (queue_.any_dropped()) ask_for_keys(now, actions);
+  tell_link(now, actions);
   return actions;
 }
 
@@ -302,7 +342,8 @@ Actions SessionProtocol::on_tick(Microseconds now) {
   } else if (state_ == State::kOpen && queue_.too_slow(now)) {
     close(wire::Goodbye::TOO_SLOW, "The client does not read what it is sent.", now);
   }
-  if (queue_.pictures_dropped() > 0) ask_for_keys(now, actions);
+  if (queue_.any_dropped()) ask_for_keys(now, actions);
+  tell_link(now, actions);
   return actions;
 }
 
@@ -322,12 +363,19 @@ void SessionProtocol::close(wire::Goodbye::Reason reason, std::string text, Micr
 void SessionProtocol::send(const wire::Envelope& envelope) { queue_.push_control(packet_of(envelope)); }
 
 Packets SessionProtocol::next_packets(Microseconds now) {
-  return queue_.take(
+  auto packets = queue_.take(
       now,
       [this](const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer) {
         return frame_packet(*bodies_, frame, answer);
       },
-      [](const NoChange& event) { return packet_of(no_change_message(event)); });
+      [](const NoChange& event) { return packet_of(no_change_message(event)); }, !pace_.full(0, now));
+  if (packets.empty() || state_ != State::kOpen) return packets;
+  std::size_t bytes = 0;
+  for (const auto& packet : packets) bytes += packet.size();
+  const auto pings = pace_.write(bytes, now);
+  if (pings.in_front) packets.insert(packets.begin(), ping_packet(*pings.in_front));
+  if (pings.behind) packets.push_back(ping_packet(*pings.behind));
+  return packets;
 }
 
 bool SessionProtocol::finished(Microseconds now) const {

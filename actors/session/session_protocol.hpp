@@ -12,6 +12,7 @@
 #include "actors/encoder/encoder_messages.hpp"
 #include "actors/session/frame_message.hpp"
 #include "actors/session/geometry_stream.hpp"
+#include "actors/session/link_pace.hpp"
 #include "actors/session/send_queue.hpp"
 #include "actors/session/session_messages.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
@@ -44,9 +45,15 @@ struct Noted {
   std::string_view what;
 };
 
+/// For metrics as well.
+struct PicturesDropped {
+  std::string_view why;
+  std::size_t count = 0;
+};
+
 /// What others are told. In order.
 using Action = std::variant<tile_scheduler::SessionOpened, tile_scheduler::ViewChanged, tile_scheduler::KeyFrameWanted,
-                            encoder::CoarseWanted, Noted>;
+                            tile_scheduler::LinkChanged, encoder::CoarseWanted, Noted, PicturesDropped>;
 using Actions = std::vector<Action>;
 
 /// One client from its first byte to its last: Hello, Welcome, manifest, geometry in view, CoarseTex, pictures and
@@ -94,6 +101,8 @@ class SessionProtocol {
                     std::uint32_t chunks_in_view);
   void send_scene(const GeometryStream::Order& order);
   void ask_for_keys(Microseconds now, Actions& actions);
+  void tell_link(Microseconds now, Actions& actions);
+  void tell_drops(Actions& actions);
 
   SessionId id_;
   SessionPolicy policy_;
@@ -103,7 +112,11 @@ class SessionProtocol {
   std::shared_ptr<FrameBodies> bodies_;
   proto::FrameReader reader_;
   SendQueue queue_;
-  std::size_t dropped_told_ = 0;  // of its dropped pictures, the scheduler knows of so many
+  LinkPace pace_;
+  std::size_t overdue_told_ = 0;  // of those that it dropped because it does not keep up, the scheduler knows so many
+  DropCounts drops_told_{};
+  tile_scheduler::LinkState link_told_ = tile_scheduler::LinkState::kFree;
+  double rate_told_ = 0;
   State state_ = State::kAwaitHello;
   Microseconds started_;
   Microseconds heard_;

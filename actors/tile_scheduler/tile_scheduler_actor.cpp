@@ -98,12 +98,21 @@ void TileSchedulerActor::on(KeyFrameWanted&& message) {
     return;
   }
   if (session->stream == nullptr) return;  // it begins with one
-  if (message.behind) note_behind(*session);
+  if (message.behind) session->link.lost_pictures(now_us());
   force_key(*session->stream);
   if (session->stream->key_put_off)
     metrics_.count("darm_key_frames_put_off_total", 1);
   else
     compose(*session->stream);
+}
+
+void TileSchedulerActor::on(LinkChanged&& message) {
+  auto* session = find(message.session);
+  if (session == nullptr) return;
+  session->link.changed(message.state, message.bytes_per_second, now_us());
+  if (session->stream == nullptr || !session->link.ready(now_us())) return;
+  if (session->stream->follows_links()) compose(*session->stream);
+  compose_view(*session);
 }
 
 void TileSchedulerActor::on(TilesShaded&& message) {
@@ -130,14 +139,17 @@ void TileSchedulerActor::on(FrameDone&& message) {
     auto& stream = *it->second;
     pace_.done(message.busy);
     stream.state.frame_done(message.frame, message.ok, message.settled);
+    note_sent(stream, message);
     const auto waits = [](const Session* member) { return member->answer.has_value(); };
     if (stream.state.has_answers() || std::ranges::any_of(stream.members, waits)) compose(stream);
     return;
   }
   view_pace_.done(message.busy);
   for (auto& [id, session] : sessions_)
-    if (session->view_layer && session->view_stream_id == message.stream)
+    if (session->view_layer && session->view_stream_id == message.stream) {
       session->view_layer->stream().frame_done(message.frame, message.ok, message.settled);
+      session->link.sent(message.bytes, now_us());
+    }
 }
 
 void TileSchedulerActor::on(ViewTraced&& message) {
@@ -173,7 +185,7 @@ void TileSchedulerActor::on(Tick&&) {
 void TileSchedulerActor::update(Session& session) {
   if (session.job && session.job->done()) finish_view(session);  // its ViewTraced found a full mailbox
   if (session.set.expire(now_us()) && session.stream) session.stream->unchosen = true;
-  if (session.behind_at && now_us() - *session.behind_at >= options_.keeps_up) set_apart(session, false);
+  settle_link(session);
   if (session.stream && session.ungrouped) group(session);
   if (session.view_layer && session.view_layer->expire(now_us())) session.view_unweighed = true;
   if (session.view_unweighed) reallocate_view(session);
@@ -213,8 +225,9 @@ void TileSchedulerActor::send_work_soon() {
 // One observation a view and update: quantiles over views, and the worst of now.
 void TileSchedulerActor::record_errors() {
   double worst = 0;
-  std::size_t done = 0;
+  std::size_t done = 0, slow = 0;
   for (const auto& [id, session] : sessions_) {
+    slow += session->format.lane > 0 ? 1 : 0;
     if (!session->posed) continue;
     metrics_.observe("darm_view_error", double(session->error));
     metrics_.observe("darm_view_resolution_error", double(session->resolution_error));
@@ -223,6 +236,7 @@ void TileSchedulerActor::record_errors() {
   }
   metrics_.set("darm_view_error_worst", worst);
   metrics_.set("darm_views_on_target", double(done));
+  metrics_.set("darm_sessions_slow", double(slow));
 }
 
 }  // namespace darm::tile_scheduler

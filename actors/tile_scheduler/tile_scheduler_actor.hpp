@@ -19,6 +19,7 @@
 #include "actors/session/session_messages.hpp"
 #include "actors/tile_scheduler/frame_pace.hpp"
 #include "actors/tile_scheduler/image_store.hpp"
+#include "actors/tile_scheduler/member_link.hpp"
 #include "actors/tile_scheduler/private_layer.hpp"
 #include "actors/tile_scheduler/shared_set.hpp"
 #include "actors/tile_scheduler/stream_groups.hpp"
@@ -60,10 +61,7 @@ struct SchedulerOptions {
   /// Least time between key frames for those who come to a stream: whoever comes meanwhile shares the next.
   Microseconds join_interval = 300'000;
   GroupOptions groups;
-  /// A client that does not keep up for longer than this goes to a stream of such clients, because its key frames are
-  /// everybody's; it comes back when it has kept up for `keeps_up`.
-  Microseconds behind = 2'000'000;
-  Microseconds keeps_up = 60'000'000;
+  LinkOptions link;
   /// Streams are shared by the tiles that make up so much of each view; coarser levels do for the rest.
   double significant = 0.98;
   /// A look of one of many that shows less than this share of what its stream's tiles were chosen for is answered when
@@ -107,6 +105,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void on(SessionClosed&& message);
   void on(ViewChanged&& message);
   void on(KeyFrameWanted&& message);
+  void on(LinkChanged&& message);
   void on(TilesShaded&& message);
   void on(ViewTilesShaded&& message);
   void on(CoarsePictured&& message);
@@ -128,15 +127,14 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool awaits_key = false;   // it came to the stream after that's last key frame
     bool unchosen = false;     // it sees what the stream's tiles have not been chosen for yet
     WorkingSet set;
-    Microseconds grouped_at = 0;               // when groups_ heard of its set
-    bool ungrouped = false;                    // which has changed since then
-    std::optional<Microseconds> behind_since;  // it has not kept up, for the first time
-    std::optional<Microseconds> behind_at;     // and lately
-    std::optional<ViewAnswer> answer;          // due with the stream's next frame
-    std::optional<ViewChanged> view;           // newest camera
-    std::optional<ViewChanged> posed;          // the camera of the working set's pose
-    CameraSequence taken_up = 0;               // newest sequence that a trace or an answer includes
-    std::shared_ptr<ViewJob> job;              // under way
+    Microseconds grouped_at = 0;  // when groups_ heard of its set
+    bool ungrouped = false;       // which has changed since then
+    MemberLink link;
+    std::optional<ViewAnswer> answer;  // due with the stream's next frame
+    std::optional<ViewChanged> view;   // newest camera
+    std::optional<ViewChanged> posed;  // the camera of the working set's pose
+    CameraSequence taken_up = 0;       // newest sequence that a trace or an answer includes
+    std::shared_ptr<ViewJob> job;      // under way
     Microseconds last_start = 0;
     std::optional<Microseconds> moved_at;  // its newest camera, looked at or not, was another than the one before
     int updates_waited = 0;
@@ -148,7 +146,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     runtime::Ref<encoder::Inbox> view_encoder;  // made with its first frame
     std::optional<Microseconds> view_key_forced_at;
     bool view_key_put_off = false;
-    Session(StreamFormat f, const SchedulerOptions& o) : format(f), set(o.working_set) {}
+    Session(StreamFormat f, const SchedulerOptions& o) : format(f), set(o.working_set), link(o.link) {}
     ~Session() {
       if (job) job->cancel();  // it goes with the session, and with the scheduler
     }
@@ -176,6 +174,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool key_put_off = false;  // asked for again too soon after that
     Stream(StreamId number, const StreamFormat& f, const StreamOptions& o) : id(number), format(f), state(f, o) {}
     [[nodiscard]] bool shared() const { return members.size() > 1; }
+    /// Its frames go out as its members' links have room for them.
+    [[nodiscard]] bool follows_links() const { return !shared() || format.lane > 0; }
   };
 
   [[nodiscard]] ImageLookup images() const;
@@ -206,8 +206,11 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void place(Session& session);
   void enter(Session& session, StreamId id);
   void leave(Session& session);
-  void note_behind(Session& session);
-  void set_apart(Session& session, bool apart);
+  void settle_link(Session& session);
+  [[nodiscard]] bool held(const Stream& stream) const;
+  [[nodiscard]] std::size_t most_bytes(const Stream& stream, bool key) const;
+  [[nodiscard]] Microseconds frame_interval(const Stream& stream, bool moving) const;
+  void note_sent(Stream& stream, const FrameDone& done);
   void regroup();
   void settle(Stream& stream);
   void group(Session& session);
@@ -237,6 +240,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void force_view_key(Session& session);
   void compose_view(Session& session);
 
+  static constexpr double kUsualKey = 1e6;  // bytes, until one was made
+
   std::shared_ptr<const atlas::Layout> layout_;
   std::shared_ptr<const renderer::trace::RayScene> rays_;
   std::shared_ptr<const Peers> peers_;
@@ -251,6 +256,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   double view_weighing_us_ = 5'000;  // what choosing a private layer's tiles is expected to take
   std::size_t moving_ = 0;           // views that move
   std::size_t view_streams_ = 0;     // private layers in use
+  double key_bytes_ = kUsualKey;     // of streams of those that keep up
   ImageStore images_;
   std::shared_ptr<const CoarseLuma> coarse_;  // null: none yet
   std::map<SessionId, std::unique_ptr<Session>> sessions_;

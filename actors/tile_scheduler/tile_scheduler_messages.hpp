@@ -1,6 +1,7 @@
 // The tile scheduler's inbox. Plain values only: peers may include this file and nothing else of the room.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <variant>
@@ -21,7 +22,8 @@ struct StreamFormat {
   bool lossless_rgb = false;
   std::uint32_t view_phystex = 0;  ///< of the private layer: 0 (none), 512 or 1024 (lossless: up to 2048)
   StreamLayer layer = StreamLayer::kShared;
-  bool apart = false;  ///< for clients that cannot keep up: they share with each other only
+  /// 0: for clients that keep up. Others, whose links are slow, share with those of their own lane only (MemberLink).
+  std::uint8_t lane = 0;
 
   bool operator==(const StreamFormat&) const = default;
   /// The format of light for everybody: sessions of one such format may share a stream.
@@ -87,6 +89,22 @@ struct KeyFrameWanted {
   }
 };
 
+enum class LinkState : std::uint8_t {
+  kFree,     ///< there is room for a picture
+  kFull,     ///< pictures are on their way, and another would only wait behind them
+  kLoading,  ///< the scene still goes out: no picture is taken
+};
+
+/// What the link of a session carries has changed. Not told of links that are always free.
+struct LinkChanged {
+  static constexpr auto kOverflow = runtime::Overflow::kLatestByKey;
+  SessionId session{};
+  LinkState state = LinkState::kFree;
+  double bytes_per_second = 0;  ///< that it carries; 0: not known
+  LinkChanged(SessionId id, LinkState s, double rate) : session(id), state(s), bytes_per_second(rate) {}
+  [[nodiscard]] std::uint64_t key() const { return static_cast<std::uint64_t>(session); }
+};
+
 /// A tile has a new picture. `error` is its estimated RMS display error (0..1), `samples` the mean samples per seen
 /// texel.
 struct ShadedTile {
@@ -133,6 +151,9 @@ struct FrameDone {
   bool ok = true;
   bool settled = true;    ///< false: the same picture coded again would be finer
   Microseconds busy = 0;  ///< processor time of composing and encoding it; 0: unknown
+  bool key = false;
+  std::size_t bytes = 0;  ///< as sent to each session
+  bool limited = false;   ///< it would have been larger without its ComposeFrame::most_bytes
   FrameDone(StreamId s, FrameNumber f, bool success, bool is_settled = true, Microseconds took = 0)
       : stream(s), frame(f), ok(success), settled(is_settled), busy(took) {}
 };
@@ -149,7 +170,7 @@ struct Tick {
   static constexpr auto kOverflow = runtime::Overflow::kLatestOnly;
 };
 
-using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, TilesShaded, ViewTilesShaded,
-                           CoarsePictured, FrameDone, ViewTraced, Tick>;
+using Inbox = std::variant<SessionOpened, SessionClosed, ViewChanged, KeyFrameWanted, LinkChanged, TilesShaded,
+                           ViewTilesShaded, CoarsePictured, FrameDone, ViewTraced, Tick>;
 
 }  // namespace darm::tile_scheduler

@@ -11,6 +11,9 @@ namespace {
 
 constexpr Microseconds kErrorEvery = 30'000;
 constexpr double kLongestUnchosenUs = 1e6;
+// Weight of the newest key frame: one that has no tiles yet says little.
+constexpr double kLearnedOfLarger = 0.5;
+constexpr double kLearnedOfSmaller = 0.02;
 
 }  // namespace
 
@@ -67,20 +70,54 @@ void TileSchedulerActor::leave(Session& session) {
   metrics_.set("darm_streams", double(streams_.size()));
 }
 
-// It has lost pictures because it does not keep up; once may happen to anybody.
-void TileSchedulerActor::note_behind(Session& session) {
-  session.behind_at = now_us();
-  if (!session.behind_since) session.behind_since = now_us();
-  if (!session.format.apart && now_us() - *session.behind_since >= options_.behind) set_apart(session, true);
-}
-
-void TileSchedulerActor::set_apart(Session& session, bool apart) {
-  if (!apart) session.behind_since = session.behind_at = std::nullopt;
-  if (session.format.apart == apart) return;
-  session.format.apart = apart;
+// A client that does not keep up goes to a stream of such clients, because its key frames are everybody's.
+void TileSchedulerActor::settle_link(Session& session) {
+  if (!session.link.settle(key_bytes_, now_us())) return;
+  const auto before = std::exchange(session.format.lane, session.link.lane());
   session.grouped_at = 0;
   session.ungrouped = true;
-  metrics_.count(apart ? "darm_sessions_set_apart_total" : "darm_sessions_taken_back_total");
+  if (before == 0)
+    metrics_.count("darm_sessions_set_apart_total");
+  else if (session.format.lane == 0)
+    metrics_.count("darm_sessions_taken_back_total");
+}
+
+// A frame would only wait behind others on the way to a member. One that has had no room for long is not waited for,
+// where there are others.
+bool TileSchedulerActor::held(const Stream& stream) const {
+  if (!stream.follows_links()) return false;
+  const auto now = now_us();
+  return std::ranges::any_of(stream.members, [&](const Session* member) {
+    return !member->link.ready(now) && (!stream.shared() || member->link.worth_waiting_for(now));
+  });
+}
+
+// What suits the slowest link of a stream that follows links; 0: any number.
+std::size_t TileSchedulerActor::most_bytes(const Stream& stream, bool key) const {
+  std::size_t most = 0;
+  if (!stream.follows_links()) return most;
+  for (const auto* member : stream.members)
+    if (const auto own = member->link.most_bytes(key); own > 0) most = most == 0 ? own : std::min(most, own);
+  return most;
+}
+
+// All streams of slow links together count as one, so that however many there are, the others have theirs.
+Microseconds TileSchedulerActor::frame_interval(const Stream& stream, bool moving) const {
+  const auto is_slow = [](const auto& entry) { return entry.second->format.lane > 0; };
+  const auto slow = static_cast<std::size_t>(std::ranges::count_if(streams_, is_slow));
+  const auto others = streams_.size() - slow;
+  const auto interval = pace_.interval(others + std::min<std::size_t>(slow, 1), moving);
+  return stream.format.lane > 0 ? pace_.interval((others + 1) * slow, moving) : interval;
+}
+
+void TileSchedulerActor::note_sent(Stream& stream, const FrameDone& done) {
+  if (!done.ok) return;
+  if (done.key && !done.limited && stream.format.lane == 0) {
+    const auto bytes = static_cast<double>(done.bytes);
+    key_bytes_ += (bytes > key_bytes_ ? kLearnedOfLarger : kLearnedOfSmaller) * (bytes - key_bytes_);
+  }
+  if (!stream.follows_links()) return;
+  for (auto* member : stream.members) member->link.sent(done.bytes, now_us());
 }
 
 // Sessions go where groups_ has put them. Whoever goes keeps its picture until the key frame of the other stream is in.
@@ -207,6 +244,7 @@ void TileSchedulerActor::compose(Stream& stream) {
     if (stream.shared()) answer_meanwhile(stream);
     return;
   }
+  if (held(stream)) return answer_meanwhile(stream);
   if (stream.asked_at == 0) stream.asked_at = started;
   const bool waits_for_pictures = stream.demand.granted.tiles.empty() && !stream.demand.target.tiles.empty();
   const bool first = stream.state.last_frame() == 0;
@@ -223,17 +261,18 @@ void TileSchedulerActor::compose(Stream& stream) {
   double squares = 0;
   for (const auto& e : errors) squares += double(e.error) * double(e.error);
   const auto error = static_cast<float>(std::sqrt(squares / double(std::max<std::size_t>(1, errors.size()))));
-  auto step =
-      stream.state.step(stream.demand.granted.tiles, images(), error, started, pace_.interval(streams_.size(), moving));
+  auto step = stream.state.step(stream.demand.granted.tiles, images(), error, started, frame_interval(stream, moving));
   for (const auto& answer : step.no_change) tell_no_change(answer);
   if (step.frame) {
     step.frame->errors = std::move(errors);
+    step.frame->most_bytes = most_bytes(stream, step.frame->key);
     send_frame(stream, std::move(*step.frame));
   }
   metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
 }
 
-// Where many share a stream there is nearly always a frame under way: they do not wait for it.
+// Where many share a stream there is nearly always a frame under way, and where links are full none comes for a while:
+// nobody waits for it.
 void TileSchedulerActor::answer_meanwhile(Stream& stream) {
   for (auto* member : stream.members) {
     if (!member->answer || member->awaits_key || member->unchosen) continue;

@@ -84,8 +84,10 @@ void TileSchedulerActor::force_view_key(Session& session) {
 void TileSchedulerActor::compose_view(Session& session) {
   if (!session.view_layer || session.view_layer->idle()) return;
   if (session.view_layer->stream().in_flight() && !session.view_encoder) session.view_layer->stream().encoder_gone();
+  if (!session.link.ready(now_us())) return;
   auto step = session.view_layer->step(now_us(), view_pace_.interval(view_streams_, false));
   if (!step.frame) return;
+  step.frame->most_bytes = session.link.most_bytes(step.frame->key) / 2;  // the shared light has the other half
   if (!session.view_encoder)
     session.view_encoder = peers_->make_encoder(session.view_stream_id, session.format.view_format());
   std::size_t used = 0;

@@ -20,6 +20,9 @@ struct ClientFigures {
   // Of its whole life.
   FaultCounts faults;
   std::int64_t begun_us = 0, welcomed_us = 0, first_frame_us = 0;  ///< 0: not yet
+  std::int64_t stalled_until_us = 0;                               ///< when its line went on; 0: it never stood
+  std::int64_t caught_up_us = 0;      ///< the first answer to a camera sent after that, 0: not yet
+  std::int64_t fresh_picture_us = 0;  ///< the first frame since then
 };
 
 }  // namespace darm::client::load

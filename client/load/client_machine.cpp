@@ -183,6 +183,8 @@ void ClientMachine::take_frame(const wire::StreamFrame& frame, std::int64_t now_
   if (!news.applied) return;
   if (stream_->stream() != 0 && !commons_.tables.agrees(stream_->stream(), stream_->frame_shown(), stream_->table()))
     figures_.faults.add(Fault::kTableDiffers);
+  if (figures_.stalled_until_us > 0 && now_us >= figures_.stalled_until_us && figures_.fresh_picture_us == 0)
+    figures_.fresh_picture_us = now_us;
   note_answer(frame.answers(), now_us);
   if (counting() && phase_ == Phase::kStreaming) {
     ++figures_.stream_frames;
@@ -208,6 +210,8 @@ void ClientMachine::note_answer(std::uint64_t sequence, std::int64_t now_us) {
   const bool counts = counting() && phase_ == Phase::kStreaming;
   switch (answers_.answered(sequence, now_us, counts ? figures_.waits_ms : uncounted_)) {
     case AnswerNews::kAnswer:
+      if (sequence_stalled_ > 0 && sequence > sequence_stalled_ && figures_.caught_up_us == 0)
+        figures_.caught_up_us = now_us;
       if (counts) ++figures_.answers;
       break;
     case AnswerNews::kBackwards:
@@ -261,6 +265,7 @@ void ClientMachine::send_camera(std::int64_t now_us, std::vector<Outgoing>& out)
   wire::DatagramBody body;
   auto& camera = *body.mutable_camera();
   camera.set_sequence(++sequence_);
+  if (now_us < figures_.stalled_until_us) sequence_stalled_ = sequence_;
   camera.set_client_time_us(now_us);
   *camera.mutable_pose() = to_pose(now_seen);
   out.push_back(sealed(std::move(body)));

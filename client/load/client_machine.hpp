@@ -63,6 +63,9 @@ class ClientMachine {
   /// The last bytes to send.
   [[nodiscard]] static std::vector<std::uint8_t> goodbye();
 
+  /// Its line carries nothing until then.
+  void stalls(std::int64_t until_us) { figures_.stalled_until_us = until_us; }
+
   /// Figures count from here to end_counting(), but not before the client's first frame.
   void begin_counting(std::int64_t now_us);
   /// Cameras of the counted time that have waited a second or more for their answer count with what they have waited.
@@ -116,6 +119,7 @@ class ClientMachine {
   AnswerLog answers_;
   std::vector<float> uncounted_;
   std::uint64_t sequence_ = 0;
+  std::uint64_t sequence_stalled_ = 0;  // of the last camera before its line went on
   std::int64_t period_us_ = 100'000;
   std::int64_t next_camera_us_ = 0;
   std::int64_t heard_us_ = 0;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -25,13 +26,14 @@ Role role_of(const CrowdShape& shape, std::uint32_t index) {
   if (from_last < shape.slow) return Role::kSlow;
   if (from_last < shape.slow + shape.vanish) return Role::kVanishing;
   if (from_last < shape.slow + shape.vanish + shape.teleport) return Role::kTeleporting;
+  if (index < shape.stall) return Role::kStalling;
   return Role::kHealthy;
 }
 
 }  // namespace
 
 std::string_view to_string(Role role) {
-  constexpr std::array<std::string_view, kRoles> kNames = {"healthy", "slow", "vanishing", "teleporting"};
+  constexpr std::array<std::string_view, kRoles> kNames = {"healthy", "slow", "vanishing", "teleporting", "stalling"};
   return kNames[static_cast<std::size_t>(role)];
 }
 
@@ -41,10 +43,13 @@ double chance(std::uint64_t seed, std::uint64_t what) {
 }
 
 Result<std::vector<ClientPlan>> plan_crowd(const CrowdShape& shape) {
-  const std::uint64_t needed = std::uint64_t{shape.draw} + shape.decode + shape.slow + shape.vanish + shape.teleport;
+  const auto first = std::max(std::uint64_t{shape.draw} + shape.decode, std::uint64_t{shape.stall});
+  const std::uint64_t needed = first + shape.slow + shape.vanish + shape.teleport;
   if (needed > shape.clients) {
-    return fail(fmt::format("--clients {}: --draw, --decode, --slow, --vanish and --teleport together name {}",
-                            shape.clients, needed));
+    return fail(
+        fmt::format("--clients {}: --draw and --decode (or --stall), --slow, --vanish and --teleport together "
+                    "name {}",
+                    shape.clients, needed));
   }
   if (shape.churn > 0 && needed == shape.clients) {
     return fail(fmt::format("--churn {}: only clients that neither decode nor misbehave leave, and of {} there is none",

@@ -63,11 +63,11 @@ void LoadConnection::start() {
 }
 
 void LoadConnection::await_bytes() {
-  if (waiting_ || silent_ || gone() || !connected_ || (down_ && down_->room() == 0)) return;
+  if (waiting_ || silent_ || stalled() || gone() || !connected_ || (down_ && down_->room() == 0)) return;
   waiting_ = true;
   tcp_.async_wait(tcp::socket::wait_read, [self = shared_from_this()](error_code ec) {
     self->waiting_ = false;
-    if (self->gone() || self->silent_) return;
+    if (self->gone() || self->silent_ || self->stalled()) return;
     if (ec) return self->end_by("connection_broken");
     self->read_bytes();
   });
@@ -127,7 +127,8 @@ void LoadConnection::deliver_due(std::int64_t now_us) {
 
 void LoadConnection::tick(std::int64_t now_us) {
   if (gone() || silent_ || !connected_) return;
-  deliver_due(now_us);
+  if (now_us >= stalled_until_) stalled_until_ = 0;
+  if (!stalled()) deliver_due(now_us);
   if (gone()) return;
   for (auto& message : machine_->due(now_us)) send(std::move(message), now_us);
   if (machine_->phase() == ClientMachine::Phase::kEnded) return end_by(machine_->end());
@@ -140,7 +141,7 @@ void LoadConnection::send(Outgoing message, std::int64_t now_us) {
     const bool lost = link_.loss > 0 && chance(machine_->plan().seed + 2, datagrams_sent_) < link_.loss;
     ++datagrams_sent_;
     if (lost || datagrams_.size() >= kMostDatagrams) return;
-    if (link_.delay_ms <= 0) return send_datagram(message.bytes);
+    if (link_.delay_ms <= 0 && !stalled()) return send_datagram(message.bytes);
     datagrams_.emplace_back(now_us + static_cast<std::int64_t>(link_.delay_ms * 1000), std::move(message.bytes));
     return;
   }
@@ -164,7 +165,7 @@ void LoadConnection::send_datagram(const std::vector<std::uint8_t>& bytes) {
 }
 
 void LoadConnection::write_next() {
-  if (writing_ || gone() || unsent_.empty()) return;
+  if (writing_ || stalled() || gone() || unsent_.empty()) return;
   writing_ = true;
   asio::async_write(tcp_, asio::buffer(unsent_.front()), [self = shared_from_this()](error_code ec, std::size_t) {
     self->writing_ = false;
@@ -201,6 +202,11 @@ void LoadConnection::vanish(bool reset) {
   error_code ignored;
   tcp_.set_option(asio::socket_base::linger(true, 0), ignored);
   end_by("vanished");
+}
+
+void LoadConnection::stall(std::int64_t until_us) {
+  stalled_until_ = until_us;
+  machine_->stalls(until_us);
 }
 
 void LoadConnection::drop() {

@@ -34,6 +34,8 @@ class LoadConnection : public std::enable_shared_from_this<LoadConnection> {
   /// Without a word: the sockets stay, and nobody reads or writes them any more; or (`reset`) the connection is broken
   /// off.
   void vanish(bool reset);
+  /// The line carries nothing until then; what is sent meanwhile goes out afterwards.
+  void stall(std::int64_t until_us);
   /// Ends at once.
   void drop();
 
@@ -45,6 +47,7 @@ class LoadConnection : public std::enable_shared_from_this<LoadConnection> {
   [[nodiscard]] bool by_plan() const { return by_plan_; }
 
  private:
+  [[nodiscard]] bool stalled() const { return stalled_until_ > 0; }
   void await_bytes();
   void read_bytes();
   void deliver(std::span<const std::uint8_t> bytes, std::int64_t now_us);
@@ -65,6 +68,7 @@ class LoadConnection : public std::enable_shared_from_this<LoadConnection> {
   std::uint64_t datagrams_sent_ = 0;
   std::deque<std::vector<std::uint8_t>> unsent_;
   std::size_t unsent_bytes_ = 0;
+  std::int64_t stalled_until_ = 0;
   bool writing_ = false, waiting_ = false, connected_ = false, silent_ = false, by_plan_ = false;
   std::string end_;
 };

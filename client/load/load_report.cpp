@@ -82,6 +82,11 @@ std::string to_json(const LoadReport& r) {
   j["seconds_to_ready"] = r.seconds_to_ready;
   j["all_ready"] = r.all_ready;
   for (std::size_t i = 0; i < kRoles; ++i) j[std::string(to_string(static_cast<Role>(i)))] = of_role(r.by_role[i]);
+  const Summary& stalling = r.by_role[static_cast<std::size_t>(Role::kStalling)];
+  j["stall"] = {{"caught_up", stalling.caught_up},
+                {"caught_up_ms", {{"p50", stalling.caught_up_ms.p50}, {"p99", stalling.caught_up_ms.p99}}},
+                {"fresh_picture_ms", {{"p50", stalling.fresh_picture_ms.p50}, {"p99", stalling.fresh_picture_ms.p99}}},
+                {"drawn", r.drawn_while_stalled}};
   j["pictures"] = {{"decoded", r.pictures.decoded},
                    {"skipped", r.pictures.skipped},
                    {"refused", r.pictures.refused},
@@ -105,6 +110,11 @@ std::string to_text(const LoadReport& r) {
                         static_cast<double>(r.server_rss_bytes->start) / 1e6,
                         static_cast<double>(r.server_rss_bytes->max) / 1e6,
                         static_cast<double>(r.server_rss_bytes->end) / 1e6);
+  if (const auto& s = r.by_role[static_cast<std::size_t>(Role::kStalling)]; s.clients > 0)
+    text += fmt::format(
+        "after the stall {} of {} answered anew after {:.0f} ms, with a frame after {:.0f} ms (p50); {} "
+        "pictures drawn meanwhile\n",
+        s.caught_up, s.clients, s.caught_up_ms.p50, s.fresh_picture_ms.p50, r.drawn_while_stalled);
   if (r.pictures.decoded > 0)
     text += fmt::format("{} pictures decoded, {} skipped, {} refused, {} drawn\n", r.pictures.decoded,
                         r.pictures.skipped, r.pictures.refused, r.pictures.drawn);

@@ -36,7 +36,10 @@ struct Summary {
   double bytes_per_client_per_second = 0;
   std::uint64_t key_frames = 0, frames_dropped = 0, view_frames = 0;
   Percentiles first_frame_seconds;  ///< from connecting, whole life
-  FaultCounts faults;               ///< whole life
+  /// Of those whose line stood and went on: from then to the first answer to a camera sent since, and the first frame.
+  Percentiles caught_up_ms, fresh_picture_ms;
+  std::uint32_t caught_up = 0;
+  FaultCounts faults;  ///< whole life
 };
 
 struct StartMaxEnd {
@@ -71,6 +74,7 @@ struct LoadReport {
   PictureCounts pictures;
   std::map<std::string, std::uint64_t> disconnects;  ///< by reason, those by plan included
   std::uint64_t joins = 0;                           ///< after the start
+  std::uint64_t drawn_while_stalled = 0;             ///< pictures, by all that draw
   std::vector<Moment> moments;
 };
 

@@ -65,6 +65,7 @@ class Run {
   void begin_counting(std::int64_t now);
   void end_counting(std::int64_t now);
   void vanish_due(std::int64_t now);
+  void stall_due(std::int64_t now);
   void churn_due(std::int64_t now);
   void record(Slot& slot, std::int64_t now);
   void look_at_server();
@@ -86,6 +87,8 @@ class Run {
   Phase phase_ = Phase::kJoining;
   bool interrupted_ = false;
   std::int64_t began_ = 0, counting_since_ = 0, settling_since_ = 0, next_look_ = 0;
+  bool stalled_ = false;
+  std::uint64_t drawn_before_ = 0;
   std::uint64_t churned_ = 0;
   std::uint32_t next_leaver_ = 0;
   double harness_cpu_ = 0, harness_cpu_before_ = 0, harness_cpu_moment_ = 0;
@@ -157,6 +160,7 @@ void Run::advance(std::int64_t now) {
   }
   if (phase_ == Phase::kCounting) {
     vanish_due(now);
+    stall_due(now);
     churn_due(now);
     if (interrupted_ || seconds(now - counting_since_) >= plan_.seconds) end_counting(now);
   }
@@ -241,6 +245,21 @@ void Run::vanish_due(std::int64_t now) {
     slots_[i].connection->machine().end_counting(now);
     slots_[i].connection->vanish(i % 2 == 0);
   }
+}
+
+// All at once; those that draw go on, with what they have.
+void Run::stall_due(std::int64_t now) {
+  const double from = plan_.seconds / 2;
+  const double at = seconds(now - counting_since_);
+  if (plan_.crowd.stall == 0 || at < from) return;
+  if (!std::exchange(stalled_, true)) {
+    for (std::size_t i = 0; i < slots_.size(); ++i)
+      if (crowd_[i].role == Role::kStalling && slots_[i].connection)
+        slots_[i].connection->stall(now + static_cast<std::int64_t>(plan_.stall_seconds * 1e6));
+    if (pictures_) drawn_before_ = pictures_->counts().drawn;
+  }
+  if (pictures_ && at < from + plan_.stall_seconds)
+    report_.drawn_while_stalled = pictures_->counts().drawn - drawn_before_;
 }
 
 // Healthy clients that do not decode leave in turn (plan_crowd() has seen to it that there are some), and somebody else

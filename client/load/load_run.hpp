@@ -23,6 +23,7 @@ struct LoadPlan {
   LinkShape link;                   ///< of every client
   std::uint32_t draw_height = 360;  ///< of pictures that are drawn
   double slow_bytes_per_second = 10'000;
+  double stall_seconds = 5;         ///< from the middle of the counted time on
   double seconds = 60;              ///< counted
   double warm_up = 60;              ///< counting begins after so long, though not all clients are ready
   double settle = 0;                ///< seconds the server is watched after all have left

@@ -91,6 +91,11 @@ void declare_crowd(CLI::App& app, LoadPlan& plan) {
       ->check(CLI::Range(0u, kMostClients));
   app.add_option("--teleport", crowd.teleport, "of these, look from somewhere else every second")
       ->check(CLI::Range(0u, kMostClients));
+  app.add_option("--stall", crowd.stall, "of these, the first: their lines stand for --stall-seconds, half-way")
+      ->check(CLI::Range(0u, kMostClients));
+  app.add_option("--stall-seconds", plan.stall_seconds, "that they stand")
+      ->capture_default_str()
+      ->check(number_option(0.1, kLongest));
   app.add_option("--churn", plan.crowd.churn, "joins a second, and as many leaves")->check(number_option(0, 1000));
   app.add_option("--spread", crowd.spread, "metres around its group's place in which each client is")
       ->capture_default_str()

@@ -22,7 +22,7 @@ Percentiles percentiles(std::vector<float> values) {
 
 Summary summarise(const std::vector<ClientRecord>& records, std::optional<Role> role) {
   Summary s;
-  std::vector<float> rates, waits, joins;
+  std::vector<float> rates, waits, joins, caught_up, fresh;
   double seconds = 0;
   std::uint64_t frames = 0, no_changes = 0, bytes = 0;
   for (const auto& record : records) {
@@ -34,6 +34,8 @@ Summary summarise(const std::vector<ClientRecord>& records, std::optional<Role> 
     s.without_frame += connected && f.first_frame_us == 0 ? 1 : 0;
     s.faults += f.faults;
     if (f.first_frame_us > 0) joins.push_back(static_cast<float>(f.first_frame_us - f.begun_us) / 1e6f);
+    if (f.caught_up_us > 0) caught_up.push_back(static_cast<float>(f.caught_up_us - f.stalled_until_us) / 1e3f);
+    if (f.fresh_picture_us > 0) fresh.push_back(static_cast<float>(f.fresh_picture_us - f.stalled_until_us) / 1e3f);
     s.cameras += f.cameras;
     s.key_frames += f.key_frames;
     s.frames_dropped += f.frames_dropped;
@@ -50,6 +52,9 @@ Summary summarise(const std::vector<ClientRecord>& records, std::optional<Role> 
   s.updates_per_second = percentiles(std::move(rates));
   s.answer_ms = percentiles(std::move(waits));
   s.first_frame_seconds = percentiles(std::move(joins));
+  s.caught_up = static_cast<std::uint32_t>(caught_up.size());
+  s.caught_up_ms = percentiles(std::move(caught_up));
+  s.fresh_picture_ms = percentiles(std::move(fresh));
   if (seconds > 0) {
     s.stream_frames_per_second = static_cast<double>(frames) / seconds;
     s.no_changes_per_second = static_cast<double>(no_changes) / seconds;

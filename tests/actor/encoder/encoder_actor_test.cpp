@@ -137,6 +137,31 @@ TEST_F(EncoderActorTest, a_lossless_stream_sends_tiles_as_they_are) {
   EXPECT_EQ(frame.lossless[0].image->rgb[0], 51);
 }
 
+TEST_F(EncoderActorTest, a_key_frame_for_a_slow_link_is_coarser_and_smaller) {
+  const auto noise = [](FrameNumber number, std::size_t most_bytes) {
+    auto command = compose(number, true);
+    auto image = std::make_shared<TileImage>(*grey_tile(0));
+    for (std::size_t i = 0; i < image->y.size(); ++i) image->y[i] = static_cast<std::uint8_t>(i * i * 31 % 251);
+    command.writes = {{0, image}, {1, image}, {2, image}, {3, image}};
+    command.most_bytes = most_bytes;
+    return command;
+  };
+  auto encoder = start(small());
+  encoder.tell(noise(1, 0));
+  system.run_until_idle();
+  ASSERT_EQ(done.size(), 1u);
+  EXPECT_FALSE(done[0].limited);
+  const auto whole = seen[0].frames[0].frame->h264.size();
+  EXPECT_GE(done[0].bytes, whole);
+  encoder.tell(noise(2, whole / 3));
+  system.run_until_idle();
+  ASSERT_EQ(done.size(), 2u);
+  EXPECT_TRUE(done[1].limited);
+  EXPECT_TRUE(done[1].key);
+  EXPECT_FALSE(done[1].settled);
+  EXPECT_LT(seen[0].frames[1].frame->h264.size(), whole / 2);
+}
+
 TEST_F(EncoderActorTest, after_a_failure_only_a_key_frame_goes_on) {
   auto encoder = start(small());
   encoder.tell(compose(1, true));

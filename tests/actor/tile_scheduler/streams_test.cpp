@@ -214,6 +214,58 @@ TEST_F(SharedStreams, ClientsThatDoNotKeepUpGetAStreamApartAndTheOthersNoneOfThe
   EXPECT_EQ(heard_.encoders, std::set<StreamId>{first_});
 }
 
+TEST_F(SharedStreams, ASlowLinkHasAStreamThatFollowsItAndTheOthersDoNotNotice) {
+  both_look_ahead();
+  scheduler_.tell(LinkChanged(bob_, LinkState::kFree, 100e3));
+  run(15);
+  ASSERT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_});
+  ASSERT_EQ(heard_.receivers[second_], std::vector<SessionId>{bob_});
+  ASSERT_FALSE(heard_.frames[second_].empty());
+  EXPECT_GT(heard_.frames[second_].back().most_bytes, 0u);
+  EXPECT_LE(heard_.frames[second_].back().most_bytes, 100'000u);
+  scheduler_.tell(LinkChanged(bob_, LinkState::kFull, 100e3));
+  system_.run_until_idle();
+  const auto frames = heard_.frames[second_].size();
+  const auto others = heard_.frames[first_].size();
+  look(bob_, 2, ahead_);
+  run(10, 2);
+  run(10, 3);
+  EXPECT_EQ(heard_.frames[second_].size(), frames) << "it would only wait";
+  EXPECT_TRUE(answered(bob_).contains(2)) << "a camera does not wait with it";
+  EXPECT_GT(heard_.frames[first_].size(), others);
+  EXPECT_EQ(heard_.frames[first_].back().most_bytes, 0u);
+  scheduler_.tell(LinkChanged(bob_, LinkState::kFree, 100e3));
+  system_.run_until_idle();
+  EXPECT_EQ(heard_.frames[second_].size(), frames + 1) << "at once";
+}
+
+TEST_F(SharedStreams, AFullLinkInAStreamOfManyIsWaitedForByNobody) {
+  both_look_ahead();
+  scheduler_.tell(LinkChanged(bob_, LinkState::kFull, 1.5e6));
+  system_.run_until_idle();
+  const auto frames = heard_.frames[first_].size();
+  run(5, 2);
+  EXPECT_GT(heard_.frames[first_].size(), frames);
+  run(20, 3);
+  EXPECT_EQ(heard_.receivers[first_], std::vector<SessionId>{ann_}) << "it stands for more than a second";
+}
+
+TEST_F(SharedStreams, WhoeverIsAloneHasFramesAsTheLinkHasRoom) {
+  open(ann_);
+  look(ann_, 1, ahead_);
+  run(10);
+  scheduler_.tell(LinkChanged(ann_, LinkState::kFull, 50e6));
+  system_.run_until_idle();
+  const auto frames = heard_.frames[first_].size();
+  scheduler_.tell(KeyFrameWanted(ann_));
+  run(5, 2);
+  EXPECT_EQ(heard_.frames[first_].size(), frames) << "not even a key frame";
+  scheduler_.tell(LinkChanged(ann_, LinkState::kFree, 50e6));
+  system_.run_until_idle();
+  ASSERT_EQ(heard_.frames[first_].size(), frames + 1);
+  EXPECT_TRUE(heard_.frames[first_].back().key);
+}
+
 TEST_F(SharedStreams, NobodyWaitsForAFrameUnderWayAndAnswersComeInOrder) {
   both_look_ahead();
   look(ann_, 2, aside_);

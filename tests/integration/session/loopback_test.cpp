@@ -25,8 +25,17 @@ class Client {
     setsockopt(socket_.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   }
   void say(const wire::Envelope& e) { asio::write(socket_, asio::buffer(proto::frame(e))); }
-  /// The next message; nothing at the end of the stream.
+  /// The next message that is no ping; nothing at the end of the stream.
   std::optional<wire::Envelope> hear() {
+    while (auto e = hear_any()) {
+      if (!e->has_ping()) return e;
+      wire::Envelope pong;
+      pong.mutable_pong()->set_time_us(e->ping().time_us());
+      say(pong);
+    }
+    return std::nullopt;
+  }
+  std::optional<wire::Envelope> hear_any() {
     wire::Envelope e;
     std::array<std::uint8_t, 4096> piece{};
     while (!reader_.next(e).value()) {

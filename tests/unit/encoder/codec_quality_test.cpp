@@ -56,5 +56,59 @@ TEST(CodecQuality, AnUnknownErrorIsCodedAtTheCoarsest) {
   EXPECT_EQ(crossed.next(false, 0.001f, 10 * kLater), 10);
 }
 
+TEST(CodecQuality, AKeyFrameThatIsTooLargeIsCodedAgainAndTheNextOneIsRightAtOnce) {
+  CodecQuality quality(18, 8);
+  const auto size = [](float crf) { return static_cast<std::size_t>(1e6 * std::exp2((18 - crf) / 5)); };
+  const float first = quality.next(true, 0.05f, 0, 250'000);
+  EXPECT_EQ(first, 18);
+  quality.coded(size(first), 0);
+  ASSERT_TRUE(quality.too_large());
+  const float second = quality.next(true, 0.05f, 0, 250'000);
+  EXPECT_GE(second, 28);
+  quality.coded(size(second), 0);
+  EXPECT_FALSE(quality.too_large());
+  EXPECT_LT(size(quality.next(true, 0.05f, kLater, 250'000)), 300'000u);
+}
+
+TEST(CodecQuality, LargeFramesMakeTheNextCoarserAndSmallOnesFinerStepByStep) {
+  CodecQuality quality(18, 8);
+  static_cast<void>(quality.next(true, 0.05f, 0, 100'000));
+  quality.coded(90'000, 0);
+  EXPECT_FALSE(quality.limited());
+  static_cast<void>(quality.next(false, 0.05f, 1, 50'000));
+  quality.coded(100'000, 1);
+  EXPECT_FALSE(quality.too_large()) << "what others build on is not coded again";
+  EXPECT_TRUE(quality.limited());
+  EXPECT_FALSE(quality.settled()) << "there is more to send of the same picture";
+  float before = quality.next(false, 0.05f, 2, 50'000);
+  EXPECT_EQ(before, 24);
+  for (int i = 1; i <= 3; ++i) {
+    quality.coded(10'000, i * kLater + 2);
+    const float now = quality.next(false, 0.05f, i * kLater + 3, 50'000);
+    EXPECT_EQ(now, before - CodecQuality::kStep);
+    before = now;
+  }
+  EXPECT_TRUE(quality.settled());
+}
+
+TEST(CodecQuality, WithoutALimitBytesSayNothing) {
+  CodecQuality quality(18, 8);
+  static_cast<void>(quality.next(true, 0.05f, 0));
+  quality.coded(100'000'000, 0);
+  EXPECT_FALSE(quality.limited());
+  EXPECT_FALSE(quality.too_large());
+}
+
+TEST(CodecQuality, ALimitThatCannotBeMetEndsAtTheCoarsestThereIs) {
+  CodecQuality quality(18, 8);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_LE(quality.next(true, 0.05f, i, 1), CodecQuality::kCoarsest);
+    quality.coded(50'000, i);
+  }
+  EXPECT_EQ(quality.next(true, 0.05f, 20, 1), CodecQuality::kCoarsest);
+  quality.coded(50'000, 20);
+  EXPECT_FALSE(quality.too_large()) << "again would be no better";
+}
+
 }  // namespace
 }  // namespace darm::encoder

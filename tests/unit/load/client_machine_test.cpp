@@ -121,6 +121,28 @@ TEST_F(ClientMachineTest, AGoodServerHasNoFaultAndIsCountedFromTheFirstFrameOn) 
   EXPECT_EQ(f.first_frame_us, 1 + 30 * kMs);
 }
 
+TEST_F(ClientMachineTest, AfterAStallItHasCaughtUpWithTheAnswerToACameraSentSince) {
+  welcome();
+  (void)machine_.due(now_);
+  send_frame(1, true, 1);
+  const auto end = now_ + 500 * kMs;
+  machine_.stalls(end);
+  now_ += 200 * kMs;
+  (void)machine_.due(now_);  // camera 2: it waits
+  now_ = end + 10 * kMs;
+  send_no_change(2);
+  EXPECT_EQ(machine_.figures().caught_up_us, 0) << "that was old";
+  (void)machine_.due(now_);
+  now_ += 30 * kMs;
+  send_frame(2, false, 3);
+  EXPECT_EQ(machine_.figures().caught_up_us, now_);
+  EXPECT_EQ(machine_.figures().fresh_picture_us, now_);
+  now_ += 100 * kMs;
+  (void)machine_.due(now_);
+  send_frame(3, false, 4);
+  EXPECT_LT(machine_.figures().caught_up_us, now_) << "the first counts";
+}
+
 TEST_F(ClientMachineTest, BytesMayComeInAnyPieces) {
   const auto message = bytes(made_up::welcome(), &Envelope::mutable_welcome);
   for (const auto byte : message) send({byte});

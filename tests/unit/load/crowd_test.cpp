@@ -44,6 +44,20 @@ TEST(Crowd, MoreRolesThanClientsAreRefused) {
   EXPECT_FALSE(plan_crowd(shape).has_value());
 }
 
+TEST(Crowd, TheFirstStallAndMayDraw) {
+  CrowdShape shape;
+  shape.clients = 4;
+  shape.draw = 1;
+  shape.stall = 2;
+  shape.slow = 2;
+  const auto crowd = plan_crowd(shape);
+  ASSERT_TRUE(crowd.has_value());
+  EXPECT_TRUE((*crowd)[0].draws);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ((*crowd)[i].role, i < 2 ? Role::kStalling : Role::kSlow) << i;
+  shape.stall = 3;
+  EXPECT_FALSE(plan_crowd(shape).has_value());
+}
+
 TEST(Crowd, ChurnNeedsSomebodyWhoMayLeave) {
   CrowdShape shape;
   shape.clients = 4;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
 #include <tuple>
 
@@ -27,6 +28,8 @@ ViewAnswer answer(CameraSequence sequence) {
   a.sequence = sequence;
   return a;
 }
+
+std::size_t dropped(const SendQueue& q) { return std::accumulate(q.drops().begin(), q.drops().end(), std::size_t{0}); }
 
 // Takes writes and remembers which pictures and answers went out.
 struct Taker {
@@ -81,10 +84,10 @@ TEST(SendQueue, the_layers_lose_pictures_each_for_itself) {
   EXPECT_TRUE(q.push_picture(own(6, true), answer(0), 2));
   // Too old by now: the private pictures go, the shared ones as well when their own next one comes, not before.
   EXPECT_FALSE(q.push_picture(own(7, false), answer(0), 900'000));
-  EXPECT_EQ(q.pictures_dropped(), 3u);
+  EXPECT_EQ(dropped(q), 3u);
   EXPECT_TRUE(q.push_picture(own(8, true), answer(0), 900'001));
   Taker taker;
-  while (!taker.take(q, 900'002).empty()) q.sent();
+  while (!taker.take(q, 900'002).empty()) q.sent(0);
   EXPECT_EQ(taker.frames, (std::vector<FrameNumber>{1, 8}));
   EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 0}));
 }
@@ -100,14 +103,14 @@ TEST(SendQueue, of_another_stream_no_picture_is_sent_before_its_key_frame) {
   Taker taker;
   EXPECT_TRUE(q.push_picture(of_stream(1, 5, true), answer(1), 0));
   taker.take(q, 0);
-  q.sent();
+  q.sent(0);
   EXPECT_FALSE(q.push_picture(of_stream(2, 6, false), answer(2), 10)) << "though its number would follow";
   EXPECT_FALSE(q.ask_for_key(10)) << "whoever comes to a stream is made one";
   EXPECT_TRUE(q.push_picture(of_stream(2, 7, true), answer(0), 20));
   EXPECT_TRUE(q.push_picture(of_stream(2, 8, false), answer(3), 30));
   EXPECT_FALSE(q.push_picture(of_stream(1, 6, false), answer(0), 31)) << "a late one of the stream before";
   EXPECT_TRUE(q.push_picture(of_stream(2, 9, false), answer(0), 40)) << "it does no harm";
-  while (!taker.take(q, 50).empty()) q.sent();
+  while (!taker.take(q, 50).empty()) q.sent(0);
   EXPECT_EQ(taker.frames, (std::vector<FrameNumber>{5, 7, 8, 9}));
   EXPECT_EQ(taker.answers, (std::vector<CameraSequence>{1, 2, 3, 0})) << "no answer is lost";
 }
@@ -126,7 +129,7 @@ TEST(SendQueue, the_key_frame_of_another_stream_replaces_what_waits) {
   EXPECT_TRUE(q.push_picture(of_stream(1, 5, true), answer(1), 0));
   EXPECT_TRUE(q.push_picture(of_stream(1, 6, false), answer(2), 0));
   EXPECT_TRUE(q.push_picture(of_stream(2, 3, true), answer(0), 1));
-  while (!taker.take(q, 2).empty()) q.sent();
+  while (!taker.take(q, 2).empty()) q.sent(0);
   EXPECT_EQ(taker.frames, std::vector<FrameNumber>{3});
   EXPECT_EQ(taker.answers, std::vector<CameraSequence>{2});
 }
@@ -149,7 +152,7 @@ TEST(SendQueue, a_key_frame_turned_away_for_geometry_is_asked_for_again_at_once)
   EXPECT_FALSE(q.push_picture(of_stream(1, 5, false), answer(0), 0));
   EXPECT_FALSE(q.push_picture(of_stream(1, 6, true), answer(0), 1));
   taker.take(q, 2);
-  q.sent();
+  q.sent(0);
   EXPECT_TRUE(q.ask_for_key(2));
 }
 
@@ -163,9 +166,9 @@ TEST(SendQueue, one_write_at_a_time_in_order) {
   EXPECT_EQ(t.sizes(q), (Sizes{3, 5}));
   q.push_bulk(bytes(7));
   EXPECT_EQ(t.sizes(q), Sizes{});
-  q.sent();
+  q.sent(0);
   EXPECT_EQ(t.sizes(q), Sizes{7});
-  q.sent();
+  q.sent(0);
   EXPECT_TRUE(q.idle());
 }
 
@@ -179,7 +182,7 @@ TEST(SendQueue, a_write_holds_as_many_messages_as_its_bytes_allow) {
   std::vector<Sizes> writes;
   for (auto write = t.sizes(q); !write.empty(); write = t.sizes(q)) {
     writes.push_back(write);
-    q.sent();
+    q.sent(0);
   }
   EXPECT_EQ(writes, (std::vector<Sizes>{{40, 40}, {40}, {250}, {60, 40}, {1}}));
 }
@@ -193,9 +196,9 @@ TEST(SendQueue, control_messages_pass_between_the_writes_of_geometry) {
   EXPECT_EQ(t.sizes(q), (Sizes{50, 50}));
   q.push_control(bytes(3));
   q.push_coarse(bytes(80));
-  q.sent();
+  q.sent(0);
   EXPECT_EQ(t.sizes(q), (Sizes{3, 80}));
-  q.sent();
+  q.sent(0);
   EXPECT_EQ(t.sizes(q), (Sizes{50, 50}));
 }
 
@@ -207,22 +210,22 @@ TEST(SendQueue, pictures_and_the_background_take_turns) {
   q.push_bulk(bytes(50));
   for (int i = 0; i < 6; ++i) q.push_background(bytes(10));
   EXPECT_EQ(t.sizes(q), Sizes{50}) << "what the first picture needs";
-  q.sent();
+  q.sent(0);
   EXPECT_TRUE(q.push_picture(picture(1, true), answer(0), 0)) << "though there is geometry left";
   EXPECT_TRUE(q.push_picture(picture(2, false), answer(0), 0));
   q.push_control(bytes(3));
   EXPECT_EQ(t.sizes(q), Sizes{1});
-  q.sent();
+  q.sent(0);
   EXPECT_EQ(t.sizes(q), (Sizes{10, 10})) << "a stream that fills the line does not keep geometry out";
-  q.sent();
+  q.sent(0);
   EXPECT_EQ(t.sizes(q), Sizes{1});
-  q.sent();
+  q.sent(0);
   EXPECT_EQ(t.sizes(q), Sizes{3}) << "control messages wait for nobody";
   for (int i = 0; i < 2; ++i) {
-    q.sent();
+    q.sent(0);
     EXPECT_EQ(t.sizes(q), (Sizes{10, 10}));
   }
-  q.sent();
+  q.sent(0);
   EXPECT_TRUE(q.idle());
   EXPECT_EQ(t.frames, (std::vector<FrameNumber>{1, 2}));
 }
@@ -234,7 +237,7 @@ TEST(SendQueue, pictures_wait_until_the_geometry_is_out) {
   EXPECT_FALSE(q.push_picture(picture(1, true), answer(9), 0));
   EXPECT_FALSE(q.ask_for_key(0));
   t.take(q, 0);
-  q.sent();
+  q.sent(0);
   EXPECT_TRUE(q.ask_for_key(0));
   EXPECT_TRUE(q.push_picture(picture(2, true), answer(0), 0));
   t.take(q, 0);
@@ -251,8 +254,8 @@ TEST(SendQueue, what_waits_too_long_goes_with_all_that_builds_on_it) {
   EXPECT_TRUE(q.push_picture(picture(1, true), answer(1), 0));
   EXPECT_TRUE(q.push_picture(picture(2, false), answer(2), 50));
   EXPECT_FALSE(q.push_picture(picture(3, false), answer(3), 101));
-  EXPECT_EQ(q.pictures_dropped(), 3u);
-  q.sent();
+  EXPECT_EQ(dropped(q), 3u);
+  q.sent(0);
   EXPECT_TRUE(q.ask_for_key(102));
   EXPECT_TRUE(q.push_picture(picture(4, true), answer(0), 103));
   t.take(q, 104);
@@ -276,7 +279,7 @@ TEST(SendQueue, no_change_waits_for_the_key_frame) {
   q.push_picture(picture(1, true), answer(4), 0);
   q.push_no_change(NoChange(answer(6), 0));
   t.take(q, 0);
-  q.sent();
+  q.sent(0);
   t.take(q, 0);
   EXPECT_EQ(t.answers, (std::vector<CameraSequence>{5, 6}));
 }
@@ -318,7 +321,7 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
       if (random() % 10 == 0) q.push_background(bytes(1));
       if (q.ask_for_key(now)) want_key = true;
       if (busy && random() % 3 == 0) {
-        q.sent();
+        q.sent(0);
         busy = false;
       }
       if (!busy) {
@@ -340,6 +343,53 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
       of = from;
     }
   }
+}
+
+TEST(SendQueue, what_a_key_frame_takes_on_a_slow_line_does_not_age_what_follows_it) {
+  SendQueue q{SendLimits{}};
+  Taker taker;
+  EXPECT_TRUE(q.push_picture(picture(1, true, 1'000'000), answer(0), 0));
+  taker.take(q, 0);
+  EXPECT_TRUE(q.push_picture(picture(2, false), answer(0), 100'000));
+  EXPECT_TRUE(q.push_picture(picture(3, false), answer(0), 2'900'000)) << "the key frame is still on its way";
+  q.sent(3'000'000);
+  EXPECT_TRUE(q.push_picture(picture(4, false), answer(0), 3'400'000));
+  taker.take(q, 3'400'000);
+  EXPECT_FALSE(q.push_picture(picture(5, false), answer(0), 3'600'000)) << "but then it counts";
+  EXPECT_EQ(q.overdue(), 2u);
+}
+
+TEST(SendQueue, every_drop_has_its_reason) {
+  SendQueue q{SendLimits{}};
+  const auto counted = [&](Drop why) { return q.drops()[static_cast<std::size_t>(why)]; };
+  q.push_bulk(bytes(10));
+  EXPECT_FALSE(q.push_picture(picture(1, true), answer(0), 0));
+  EXPECT_EQ(counted(Drop::kLoading), 1u);
+  Taker taker;
+  taker.take(q, 0);
+  q.sent(0);
+  EXPECT_FALSE(q.push_picture(picture(2, false), answer(0), 0));
+  EXPECT_EQ(counted(Drop::kKeyNeeded), 1u);
+  EXPECT_TRUE(q.push_picture(picture(3, true), answer(0), 0));
+  EXPECT_TRUE(q.push_picture(picture(4, true), answer(0), 1));
+  EXPECT_EQ(counted(Drop::kReplaced), 1u);
+  EXPECT_FALSE(q.push_picture(picture(5, false, 5u << 20), answer(0), 2));
+  EXPECT_EQ(counted(Drop::kFull), 1u);
+  EXPECT_TRUE(q.push_picture(picture(6, true), answer(0), 3));
+  EXPECT_FALSE(q.push_picture(picture(7, false), answer(0), 900'000));
+  EXPECT_EQ(counted(Drop::kOld), 1u);
+  EXPECT_TRUE(q.push_picture(of_stream(1, 8, true), answer(0), 900'001));
+  EXPECT_FALSE(q.push_picture(of_stream(2, 9, false), answer(0), 900'002));
+  EXPECT_EQ(counted(Drop::kElsewhere), 1u);
+  EXPECT_EQ(q.overdue(), 2u) << "the others are no sign of a client that does not keep up";
+}
+
+TEST(SendQueue, the_background_waits_for_room) {
+  SendQueue q{SendLimits{}};
+  q.push_background(bytes(10));
+  const auto none = [](const auto&...) { return Packet{}; };
+  EXPECT_TRUE(q.take(0, none, none, false).empty());
+  EXPECT_EQ(q.take(0, none, none, true).size(), 1u);
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ TEST_F(StreamGroupsTest, WhoIsSetApartSharesWithOthersThatAreAndComesBack) {
   for (std::size_t i = 0; i < 4; ++i) put(i, tiles(0, 50));
   const auto together = at(0);
   auto apart = format();
-  apart.apart = true;
+  apart.lane = 4;
   put(1, tiles(0, 50), apart);
   put(3, tiles(0, 50), apart);
   EXPECT_EQ(at(1), together) << "until streams are looked at";
