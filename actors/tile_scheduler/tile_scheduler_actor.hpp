@@ -22,6 +22,7 @@
 #include "actors/tile_scheduler/member_link.hpp"
 #include "actors/tile_scheduler/private_layer.hpp"
 #include "actors/tile_scheduler/shared_set.hpp"
+#include "actors/tile_scheduler/slot_waits.hpp"
 #include "actors/tile_scheduler/stream_groups.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
 #include "actors/tile_scheduler/trace_budget.hpp"
@@ -159,6 +160,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     StreamFormat format;
     runtime::Ref<encoder::Inbox> encoder;
     StreamState state;
+    SlotWaits waits;
     std::vector<Session*> members;  // by id
     SharedSet together;             // what they see, while there are several
     ViewDemand demand;              // as slots were chosen last
@@ -211,6 +213,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   [[nodiscard]] std::size_t most_bytes(const Stream& stream, bool key) const;
   [[nodiscard]] Microseconds frame_interval(const Stream& stream, bool moving) const;
   void note_sent(Stream& stream, const FrameDone& done);
+  void note_slots(Stream& stream, const StreamStep& step);
   void regroup();
   void settle(Stream& stream);
   void group(Session& session);

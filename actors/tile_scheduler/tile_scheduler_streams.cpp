@@ -263,12 +263,22 @@ void TileSchedulerActor::compose(Stream& stream) {
   const auto error = static_cast<float>(std::sqrt(squares / double(std::max<std::size_t>(1, errors.size()))));
   auto step = stream.state.step(stream.demand.granted.tiles, images(), error, started, frame_interval(stream, moving));
   for (const auto& answer : step.no_change) tell_no_change(answer);
+  note_slots(stream, step);
   if (step.frame) {
     step.frame->errors = std::move(errors);
     step.frame->most_bytes = most_bytes(stream, step.frame->key);
     send_frame(stream, std::move(*step.frame));
   }
   metrics_.observe("darm_frame_plan_seconds", double(now_us() - started) * 1e-6);
+}
+
+// What oversubscription does: how long tiles wait for a slot, and how many lose theirs.
+void TileSchedulerActor::note_slots(Stream& stream, const StreamStep& step) {
+  for (const auto updates : stream.waits.update(stream.demand.target.tiles, stream.state.table()))
+    metrics_.observe("darm_slot_wait_updates", double(updates));
+  if (!step.frame || step.frame->key) return;
+  const auto lost = std::ranges::count(step.frame->edits, kNoSlot, &encoder::PageEdit::slot);
+  if (lost > 0) metrics_.count("darm_slot_evictions_total", double(lost));
 }
 
 // Where many share a stream there is nearly always a frame under way, and where links are full none comes for a while:

@@ -312,7 +312,7 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
       now += random() % 20;
       const bool key = want_key || random() % 20 == 0;
       want_key = false;
-      if (random() % 30 == 0) stream = 1 + random() % 3;
+      if (random() % 30 == 0) stream = 1 + static_cast<std::uint32_t>(random() % 3);
       auto f = std::make_shared<EncodedFrame>(*picture(n, key, 50 + random() % 200));
       f->stream = StreamId{stream};
       q.push_picture(f, answer(0), now);
@@ -327,8 +327,8 @@ TEST(SendQueue, never_sends_a_picture_after_a_gap) {
       if (!busy) {
         busy = !q.take(
                      now,
-                     [&](const auto& f, const ViewAnswer&) {
-                       out.emplace_back(f->frame, f->key, f->stream);
+                     [&](const auto& taken, const ViewAnswer&) {
+                       out.emplace_back(taken->frame, taken->key, taken->stream);
                        return bytes(1);
                      },
                      [](const NoChange&) { return bytes(1); })
