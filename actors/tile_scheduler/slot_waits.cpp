@@ -1,20 +1,18 @@
 #include "actors/tile_scheduler/slot_waits.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace darm::tile_scheduler {
 
-std::vector<std::uint32_t> SlotWaits::update(std::span<const TileId> wanted, const PageTable& table) {
-  ++updates_;
-  std::vector<std::uint32_t> ended;
-  std::unordered_map<TileId, std::uint64_t> still;
+std::vector<Microseconds> SlotWaits::update(std::span<const TileId> wanted, const PageTable& table, Microseconds now) {
+  std::vector<Microseconds> ended;
+  std::unordered_map<TileId, Microseconds> still;
   for (const auto tile : wanted) {
     const auto before = since_.find(tile);
     if (table.slot_of(tile) == kNoSlot)
-      still.emplace(tile, before == since_.end() ? updates_ : before->second);
+      still.emplace(tile, before == since_.end() ? now : before->second);
     else if (before != since_.end())
-      ended.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(updates_ - before->second, 0xffffffffu)));
+      ended.push_back(now - before->second);
   }
   since_ = std::move(still);
   return ended;

@@ -56,7 +56,7 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_sessions_slow", "Sessions on streams of those that do not keep up, now"},
     {"darm_sessions_taken_back_total", "Sessions that kept up again and came back"},
     {"darm_slot_evictions_total", "Tiles that lost their slot of a shared stream to another, key frames left out"},
-    {"darm_slot_wait_updates", "Updates that a tile waited for its slot and picture, where it was not there at once"},
+    {"darm_slot_wait_seconds", "Time that a tile waited for its slot and picture, where it was not there at once"},
     {"darm_slots_used", "Slots of shared streams that hold a tile"},
     {"darm_store_bytes", "Bytes of the radiance store"},
     {"darm_store_refused_updates", "Updates that the store refused because it is full"},
