@@ -168,8 +168,9 @@ void TileSchedulerActor::on(Tick&&) {
   for (auto& [id, stream] : streams_) {
     stream->pictures_since = stream->pictures_since || pictures_came_;
     stream->ungranted = stream->ungranted || pictures_came_;
-    const bool reweigh =
-        stream->demand.crowded && stream->pictures_since && now_us() - stream->weighed_at >= options_.reweigh_interval;
+    const bool reweigh = stream->demand.crowded && stream->pictures_since &&
+                         now_us() - stream->weighed_at >= options_.reweigh_interval << stream->reweighed;
+    if (reweigh) stream->reweighed = std::min(stream->reweighed + 1, kMostReweighed);
     if (reweigh || (stream->shared() && stream->together.stale(now_us()))) stream->unchosen = true;
     choose_if_due(*stream);
     if (stream->ungranted) grant(*stream);

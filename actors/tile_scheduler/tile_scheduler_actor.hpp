@@ -53,7 +53,8 @@ struct SchedulerOptions {
   double coding = 0.25;        ///< and that composing and encoding shared streams may take, views that move apart
   double coding_views = 0.05;  ///< and private layers
   std::size_t image_bytes = 512u << 20;  ///< pictures of tiles kept, used or not
-  /// How often a still view that does not fit its slots is weighed anew by what its pictures have come to show.
+  /// When a still view that does not fit its slots is weighed anew by what its pictures have come to show; then after
+  /// twice that, and so on: slots change hands a few times at first, and then no more.
   Microseconds reweigh_interval = 1'000'000;
   /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.
   Microseconds first_frame_wait = 300'000;
@@ -170,6 +171,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool unchosen = false;          // there is more to see
     bool ungranted = false;         // pictures have come since then
     bool pictures_since = false;    // and since slots were chosen
+    int reweighed = 0;              // times that they were chosen for nothing but that, since somebody saw more
     Microseconds asked_at = 0;      // for the first pictures
     std::optional<Microseconds> key_at;
     std::optional<Microseconds> key_forced_at;
@@ -243,7 +245,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void force_view_key(Session& session);
   void compose_view(Session& session);
 
-  static constexpr double kUsualKey = 1e6;  // bytes, until one was made
+  static constexpr int kMostReweighed = 20;  // by then a doubled pause is days
+  static constexpr double kUsualKey = 1e6;   // bytes, until one was made
 
   std::shared_ptr<const atlas::Layout> layout_;
   std::shared_ptr<const renderer::trace::RayScene> rays_;

@@ -207,6 +207,7 @@ void TileSchedulerActor::know_view(Session& session, ViewAnswer answer) {
     auto& stream = *session.stream;
     session.ungrouped = true;
     stream.unchosen = true;
+    stream.reweighed = 0;
     session.unchosen = !stream.shared() || known_share(session.set.current(), stream.known) < options_.known;
     choose_if_due(stream);
   }
