@@ -162,6 +162,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     runtime::Ref<encoder::Inbox> encoder;
     StreamState state;
     SlotWaits waits;
+    Microseconds waits_at = 0;      // when they were looked at
     std::vector<Session*> members;  // by id
     SharedSet together;             // what they see, while there are several
     ViewDemand demand;              // as slots were chosen last
@@ -245,6 +246,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void force_view_key(Session& session);
   void compose_view(Session& session);
 
+  static constexpr Microseconds kWaitsEvery = 100'000;
   static constexpr int kMostReweighed = 20;  // by then a doubled pause is days
   static constexpr double kUsualKey = 1e6;   // bytes, until one was made
 

@@ -274,8 +274,12 @@ void TileSchedulerActor::compose(Stream& stream) {
 
 // What oversubscription does: how long tiles wait for a slot, and how many lose theirs.
 void TileSchedulerActor::note_slots(Stream& stream, const StreamStep& step) {
-  for (const auto waited : stream.waits.update(stream.demand.target.tiles, stream.state.table(), now_us()))
-    metrics_.observe("darm_slot_wait_seconds", double(waited) * 1e-6);
+  // Not at every step, of which a stream of many has hundreds a second: it looks at every tile.
+  if (const auto now = now_us(); now - stream.waits_at >= kWaitsEvery) {
+    stream.waits_at = now;
+    for (const auto waited : stream.waits.update(stream.demand.target.tiles, stream.state.table(), now))
+      metrics_.observe("darm_slot_wait_seconds", double(waited) * 1e-6);
+  }
   if (!step.frame || step.frame->key) return;
   const auto lost = std::ranges::count(step.frame->edits, kNoSlot, &encoder::PageEdit::slot);
   if (lost > 0) metrics_.count("darm_slot_evictions_total", double(lost));
