@@ -19,6 +19,7 @@
 #include "client/core/gles_resources.hpp"
 #include "client/core/shaders.hpp"
 #include "client/core/stream_textures.hpp"
+#include "client/core/view_space.hpp"
 
 namespace darm::client {
 namespace {
@@ -86,26 +87,6 @@ namespace {
 
 bool is_blended(const InstanceShape& i) { return i.alpha_mode == AlphaMode::kBlend || i.transmission > 0; }
 
-glm::vec3 centre(const Chunk& chunk, const InstanceShape& instance) {
-  return glm::vec3(instance.to_world * glm::vec4((chunk.low + chunk.high) * 0.5f, 1.0f));
-}
-
-// True if all corners of the box are outside one plane of the view's pyramid.
-bool outside(const Chunk& chunk, const glm::dmat4& to_clip) {
-  std::array<int, 5> out{};
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec4 p =
-        to_clip * glm::dvec4((corner & 1) ? chunk.high.x : chunk.low.x, (corner & 2) ? chunk.high.y : chunk.low.y,
-                             (corner & 4) ? chunk.high.z : chunk.low.z, 1.0);
-    out[0] += p.x < -p.w;
-    out[1] += p.x > p.w;
-    out[2] += p.y < -p.w;
-    out[3] += p.y > p.w;
-    out[4] += p.w < 0;
-  }
-  return std::any_of(out.begin(), out.end(), [](int n) { return n == 8; });
-}
-
 // RGBA, bottom row first.
 std::vector<std::uint8_t> read_pixels(const gles::Target& target) {
   std::vector<std::uint8_t> rgba(std::size_t{target.width()} * target.height() * 4);
@@ -114,16 +95,6 @@ std::vector<std::uint8_t> read_pixels(const gles::Target& target) {
   glReadPixels(0, 0, static_cast<GLsizei>(target.width()), static_cast<GLsizei>(target.height()), GL_RGBA,
                GL_UNSIGNED_BYTE, rgba.data());
   return rgba;
-}
-
-glm::dmat4 world_to_clip(const SceneModel& scene, const View& view, bool reversed) {
-  const double diagonal = std::max(1e-3, glm::length(glm::dvec3(scene.high()) - glm::dvec3(scene.low())));
-  const glm::dvec3 eye = view.position - scene.origin();
-  const glm::dvec3 farthest =
-      glm::max(glm::abs(eye - glm::dvec3(scene.low())), glm::abs(eye - glm::dvec3(scene.high())));
-  const double near_plane = reversed ? diagonal * 1e-5 : diagonal / 5000;
-  const double far_plane = std::max(near_plane * 2, glm::length(farthest) * 1.01);
-  return projection_matrix(view, near_plane, far_plane, reversed) * view_matrix(view, scene.origin());
 }
 
 }  // namespace
