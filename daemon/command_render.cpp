@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -148,9 +149,10 @@ int run(const RenderCommand& command) {
   if (!*made) return lifecycle::kInterrupted;
   const auto& report = **made;
   const std::string text = report.dump(2);
-  if (std::FILE* file = std::fopen(PictureFiles(command.out).with(".json").c_str(), "w")) {
-    std::fprintf(file, "%s\n", text.c_str());
-    std::fclose(file);
+  const auto file = PictureFiles(command.out).with(".json");
+  if (!(std::ofstream(file) << text << '\n').flush()) {
+    std::fprintf(stderr, "darmd render: %s: cannot be written\n", file.c_str());
+    return 1;
   }
   if (command.json) {
     std::printf("%s\n", text.c_str());

@@ -193,9 +193,8 @@ void Daemon::report_store() {
   const auto now = parts.world.store->counters();
   if (now.refused_full > 0 && parts.reported.refused_full == 0)
     spdlog::warn(
-        "radiance store: full at {} tiles, so what is newly seen stays coarse; raise state.max_store_bytes, make room "
-        "on "
-        "the disk, or remove {} while darmd is stopped",
+        "radiance store: full at {} tiles, so what is newly seen stays coarse; raise state.max_store_bytes, make "
+        "room on the disk, or remove {} while darmd is stopped",
         now.tiles, parts.world.store->path().string());
   if (now.torn > parts.reported.torn)
     spdlog::warn("radiance store: {} damaged tiles refused so far; they are lit anew", now.torn);

@@ -100,9 +100,8 @@ Result<std::unique_ptr<prometheus::Exposer>> make_exposer(const std::string& add
   const std::string where = host_and_port(address, port);
   const auto advice = [&address] {
     if (address.find(':') != std::string::npos)
-      return "the HTTP server may have been built without IPv6: set listen.address to \"::\", or listen.metrics_port "
-             "to "
-             "-1 (off)";
+      return "the HTTP server may have been built without IPv6: set listen.address to \"::\", or "
+             "listen.metrics_port to -1 (off)";
     return is_of_this_machine(address) ? "is the port taken? set listen.metrics_port (-1: off)"
                                        : "listen.address is no address of this machine; 0.0.0.0 is every one";
   };
