@@ -311,8 +311,11 @@ std::vector<encoder::ViewError> TileSchedulerActor::errors_of(const Stream& stre
     if (!member->error_at || now - *member->error_at >= enough) {
       const auto& demand = stream.demand;
       const bool coarse = coarse_ != nullptr;
+      const auto& seen = member->set.current();
+      const bool nothing = seen.samples() > 0 && seen.chains().empty();  // but the sky
       member->error =
-          stream.shared()
+          nothing ? 0.0f
+          : stream.shared()
               ? view_error(member->set.current(), stream.known, demand, images(), layout_->coarse_level(), coarse)
               : view_error(demand.chains, demand.granted.served, images(), layout_->coarse_level(), coarse);
       member->resolution_error = member->set.current().resolution_error();

@@ -192,7 +192,8 @@ float view_error(std::span<const WeightedChain> chains, std::span<const std::uin
       if (const auto* stored = images(chain.tiles[position]))
         squared = double(stored->error) * double(stored->error) + too_coarse(position) * too_coarse(position);
     } else if (has_coarse) {
-      squared = too_coarse(coarse_level - chain.sharp_level()) * too_coarse(coarse_level - chain.sharp_level());
+      const double coarser = too_coarse(coarse_level - chain.sharp_level());
+      squared = coarser * coarser + double{options.coarse_tex} * double{options.coarse_tex};
     }
     sum += double(share) * squared;
     weight += double(share);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -99,7 +100,7 @@ TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
         d.chains, d.granted.served, [this](TileId t) { return find(t); }, world_.layout->coarse_level(), has_coarse);
   };
   EXPECT_FLOAT_EQ(error(false), ErrorOptions{}.unlit);
-  EXPECT_LE(error(true), error_of_coarser(16));
+  EXPECT_LE(error(true), std::hypot(error_of_coarser(16), ErrorOptions{}.coarse_tex));
   for (std::size_t i = 0; i < d.target.tiles.size(); i += 2) shade(d.target.tiles[i], 0.1f);
   const auto lookup = [this](TileId t) { return find(t); };
   grant_available(d, world_.layout->coarse_level(), PageTable(4096), lookup, {});
@@ -112,6 +113,16 @@ TEST_F(Demand, GrantsOnlyTilesWithPicturesAndEndsAtTheTarget) {
   grant_available(d, world_.layout->coarse_level(), PageTable(4096), lookup, {});
   EXPECT_EQ(d.granted.tiles, d.target.tiles);
   EXPECT_NEAR(error(true), 0.1f, 1e-5);
+}
+
+// A small scene's sharp level may be the coarse level itself: nothing is too coarse then, and yet it is no tile.
+TEST(ViewError, OfCoarseTexIsNeverNothing) {
+  Chain chain;
+  chain.tiles[0] = TileId(2, 0);
+  const std::vector<WeightedChain> chains{{chain, 1.0f}};
+  const std::vector<std::uint8_t> served{kServedByCoarse};
+  const auto none = [](TileId) -> const StoredImage* { return nullptr; };
+  EXPECT_FLOAT_EQ(view_error(chains, served, none, 2, true), ErrorOptions{}.coarse_tex);
 }
 
 TEST(JoinRequests, AddsWeightsAndJoinsMasks) {
