@@ -102,16 +102,21 @@ class WebTest : public SessionWorld {
   static void say(Stream& socket, const wire::Envelope& e) {
     socket.write(asio::buffer(e.SerializeAsString()));
   }
-  // The next message; nothing at the end.
+  // The next message that is no ping; nothing at the end.
   template <class Stream>
   std::optional<wire::Envelope> hear(Stream& socket) {
-    beast::flat_buffer message;
-    beast::error_code ec;
-    socket.read(message, ec);
-    wire::Envelope e;
-    if (ec || !socket.got_binary() || !e.ParseFromArray(message.data().data(), static_cast<int>(message.size())))
-      return std::nullopt;
-    return e;
+    for (;;) {
+      beast::flat_buffer message;
+      beast::error_code ec;
+      socket.read(message, ec);
+      wire::Envelope e;
+      if (ec || !socket.got_binary() || !e.ParseFromArray(message.data().data(), static_cast<int>(message.size())))
+        return std::nullopt;
+      if (!e.has_ping()) return e;
+      wire::Envelope pong;
+      pong.mutable_pong()->set_time_us(e.ping().time_us());
+      socket.write(asio::buffer(pong.SerializeAsString()), ec);
+    }
   }
   template <class Stream>
   std::optional<wire::Welcome> enter(websocket::stream<Stream>& socket) {
