@@ -35,6 +35,10 @@ std::uint64_t check_sum(const ReferenceState& state) {
   return h;
 }
 
+glm::vec3 mean_of(const QuarterMean& a, const QuarterMean& b, float weight_a, float weight_b) {
+  return (a.mean * weight_a + b.mean * weight_b) / (weight_a + weight_b);
+}
+
 }  // namespace
 
 ReferenceState::ReferenceState(std::uint64_t hash, std::uint32_t picture_width, std::uint32_t picture_height)
@@ -43,6 +47,7 @@ ReferenceState::ReferenceState(std::uint64_t hash, std::uint32_t picture_width, 
 }
 
 Picture ReferenceState::picture(int half) const {
+  constexpr float kWhite = 1.0f;
   Picture made{width, height, std::vector<glm::vec3>(std::size_t{width} * height)};
   for (std::size_t pixel = 0; pixel < made.pixels.size(); ++pixel) {
     glm::vec3 sum(0.0f);
@@ -53,7 +58,9 @@ Picture ReferenceState::picture(int half) const {
       const float wa = half == 1 ? 0.0f : static_cast<float>(a.count);
       const float wb = half == 0 ? 0.0f : static_cast<float>(b.count);
       if (wa + wb <= 0) continue;
-      sum += glm::clamp((a.mean * wa + b.mean * wb) / (wa + wb), 0.0f, 1.0f);
+      const glm::vec3 both = mean_of(a, b, static_cast<float>(a.count), static_cast<float>(b.count));
+      const glm::vec3 own = mean_of(a, b, wa, wb);
+      for (int c = 0; c < 3; ++c) sum[c] += both[c] < kWhite ? std::max(own[c], 0.0f) : kWhite;
       filled += 1;
     }
     if (filled > 0) made.pixels[pixel] = sum / filled;

@@ -6,7 +6,8 @@
 
 namespace darm::client {
 
-/// A reference as two independent halves of equal effort (DESIGN section 4 "Reference").
+/// A reference as two independent halves of equal effort (DESIGN section 4 "Reference"), linear and display-referred:
+/// 1 is white, and a half may be above it by its noise.
 struct Reference {
   ImageF a, b;
 };

@@ -8,8 +8,9 @@
 namespace darm::accuracy {
 namespace {
 
+// A half may be above white by its noise, which the other half's cancels: cut off, it would not.
 double display(float linear) {
-  const double x = std::isfinite(linear) ? std::clamp(static_cast<double>(linear), 0.0, 1.0) : 0.0;
+  const double x = std::isfinite(linear) ? std::max(static_cast<double>(linear), 0.0) : 0.0;
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
 }
 

@@ -13,7 +13,8 @@ struct Halves {
   renderer::Picture a, b;
 };
 
-/// A reference as it is shown: display RGB, 0..1, three numbers a pixel. Made once: it is compared with many pictures.
+/// A reference as it is shown: display RGB, 1 is white, which a half may be above by its noise; three numbers a pixel.
+/// Made once: it is compared with many pictures.
 struct ShownHalves {
   explicit ShownHalves(const Halves& halves);
   std::vector<float> a, b;
