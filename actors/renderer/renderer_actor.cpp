@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "actors/renderer/display_curve.hpp"
+#include "actors/renderer/divided_texels.hpp"
 #include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/texel_shading.hpp"
 
@@ -47,9 +48,13 @@ TilePicture from_stored(const atlas::StoredPicture& stored) {
 }  // namespace
 
 struct RendererActor::Shared {
-  explicit Shared(RendererParts p) : parts(std::move(p)) {}
+  explicit Shared(RendererParts p)
+      : parts(std::move(p)),
+        divided(static_cast<int>(parts.levels.size()) - 1,
+                parts.levels.empty() ? 0 : parts.levels.back().x * parts.levels.back().y) {}
   RendererParts parts;
   TileFactsCache facts;
+  DividedTexels divided;                     // of the coarse level
   std::shared_ptr<const StoredLight> light;  // of the coarse level; changes between phases
   std::uint64_t picture_tag = picture_tag_of(parts.options.display);
 
@@ -339,8 +344,11 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
     if (picture && job.keep) store.put_picture(job.tile, shared.picture_tag, to_stored(*picture));
   }
   if (job.coarse) {
-    if (const auto light = store.read(job.tile); light && batch.light)
-      batch.light->put(job.tile.index(), stored_texels(*light, display.filtered()));
+    if (const auto light = store.read(job.tile); light && batch.light) {
+      auto texels = stored_texels(*light, display.filtered());
+      shared.divided.forget(job.tile.index(), texels, *shared.parts.surfaces);
+      batch.light->put(job.tile.index(), texels);
+    }
     if (picture) batch.canvas->put(job.tile.index(), *picture->image);
   } else {
     batch.results[index].picture = std::move(picture);

@@ -37,16 +37,18 @@ struct SurfaceWorld {
     return std::clamp(a, 0.0f, 1.0f);
   }
 
-  /// A point of a texel by the next numbers of `sampler`. A texel half cut away shows the colour of its other half:
-  /// points that MASK cuts are drawn again, up to eight times. nullopt: nothing under the texel.
+  /// A point of a texel by the next numbers of `sampler`, off the edges of its triangle, so that no ray begins beyond
+  /// the wall that meets it there. A texel half cut away shows the colour of its other half: points that MASK cuts are
+  /// drawn again, up to eight times. nullopt: nothing under the texel.
   [[nodiscard]] std::optional<SurfacePoint> covered_point(const atlas::TileTexels& texels, int x, int y,
                                                           Sampler& sampler) const {
     constexpr int kTries = 8;
     auto point = texels.sample(x, y, sampler.next_2d());
-    if (!point || material_of(point->instance).alpha_mode != scene::AlphaMode::kMask) return point;
-    for (int i = 0; i < kTries && alpha(*point) == 0.0f; ++i)
-      if (const auto again = texels.sample(x, y, sampler.next_2d())) point = again;
-    return point;
+    if (!point) return point;
+    if (material_of(point->instance).alpha_mode == scene::AlphaMode::kMask)
+      for (int i = 0; i < kTries && alpha(*point) == 0.0f; ++i)
+        if (const auto again = texels.sample(x, y, sampler.next_2d())) point = again;
+    return trace::off_edges(transport->rays(), *point);
   }
 };
 

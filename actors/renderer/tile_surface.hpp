@@ -36,6 +36,11 @@ class TileSurface {
   [[nodiscard]] virtual std::optional<float> alpha(int texel, std::uint32_t sample) const = 0;
   /// True if some texel's material is alpha MASK or BLEND.
   [[nodiscard]] virtual bool translucent() const = 0;
+  /// True if something stands between the texel's middle and its sides, so that its light is that of two places.
+  [[nodiscard]] virtual bool divided(int texel) const {
+    (void)texel;
+    return false;
+  }
 };
 
 /// The surfaces of all tiles. Thread-safe.

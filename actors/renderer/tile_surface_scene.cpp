@@ -1,6 +1,8 @@
 #include "actors/renderer/tile_surface_scene.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "actors/renderer/sampler.hpp"
 #include "actors/renderer/surface_world.hpp"
@@ -73,7 +75,34 @@ class SceneTile : public TileSurface {
     });
   }
 
+  [[nodiscard]] bool divided(int texel) const override {
+    constexpr std::array<glm::vec2, 4> kSides{{{0, 0.5f}, {1, 0.5f}, {0.5f, 0}, {0.5f, 1}}};
+    const auto middle = surface_at(texel, glm::vec2(0.5f));
+    return middle && std::ranges::any_of(kSides, [&](const glm::vec2& side) {
+             const auto end = surface_at(texel, side);
+             return end && parted(*middle, *end);
+           });
+  }
+
  private:
+  [[nodiscard]] std::optional<trace::Surface> surface_at(int texel, const glm::vec2& xi) const {
+    const auto point = texels_->sample(texel % kTileSize, texel / kTileSize, xi);
+    if (!point) return std::nullopt;
+    const auto& rays = world_->transport->rays();
+    return trace::make_unbent_surface(rays, trace::off_edges(rays, *point));
+  }
+
+  // The look goes a quarter of its length above the surface: a curved one is no wall to itself.
+  [[nodiscard]] bool parted(const trace::Surface& a, const trace::Surface& b) const {
+    const glm::vec3 apart = b.position - a.position;
+    const float lift = 0.25f * std::sqrt(glm::dot(apart, apart)) + std::max(a.offset, b.offset);
+    trace::Ray look;
+    look.origin = a.position + a.geometric_normal * lift;
+    look.direction = b.position + b.geometric_normal * lift - look.origin;
+    look.tmax = 1;
+    return world_->transport->rays().occluded(look);
+  }
+
   [[nodiscard]] std::optional<SurfacePoint> covered_point(int texel, Sampler& sampler) const {
     return world_->covered_point(*texels_, texel % kTileSize, texel / kTileSize, sampler);
   }

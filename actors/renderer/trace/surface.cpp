@@ -1,5 +1,7 @@
 #include "actors/renderer/trace/surface.hpp"
 
+#include <array>
+
 #include "actors/scene/texture_sampling.hpp"
 
 namespace darm::renderer::trace {
@@ -32,6 +34,30 @@ Surface make_surface(const RayScene& scene, const SurfacePoint& point) {
   Surface s = make_unbent_surface(scene, point);
   if (s.has_normal_map()) bend_normal(s, scene.scene());
   return s;
+}
+
+SurfacePoint off_edges(const RayScene& scene, const SurfacePoint& point) {
+  constexpr float kOnEdge = 1e-5f;  // barycentric: clamping leaves zero or a rounding error
+  constexpr float kRayOffsets = 8;  // the wall's own rounding, and rays that leave at a slant
+  constexpr float kMostOfHeight = 0.25f;
+  glm::vec3 weights(1.0f - point.u - point.v, point.u, point.v);
+  if (std::min({weights.x, weights.y, weights.z}) > kOnEdge) return point;
+  const Surface s = make_unbent_surface(scene, point);
+  const glm::uvec3 corner = s.placed->mesh->triangles[point.triangle];
+  const std::array<glm::vec3, 3> at{s.placed->positions[corner.x], s.placed->positions[corner.y],
+                                    s.placed->positions[corner.z]};
+  for (int i = 0; i < 3; ++i) {
+    const glm::vec3 edge = at[static_cast<std::size_t>((i + 2) % 3)] - at[static_cast<std::size_t>((i + 1) % 3)];
+    const float length = std::sqrt(glm::dot(edge, edge));
+    // Distance over height; height = 2 area / edge. NaN, of a triangle without area, is the most there may be.
+    const float share = kRayOffsets * s.offset * length / (2 * s.area);
+    weights[i] = std::max(weights[i], share < kMostOfHeight ? share : kMostOfHeight);
+  }
+  weights /= weights.x + weights.y + weights.z;
+  SurfacePoint moved = point;
+  moved.u = weights.y;
+  moved.v = std::min(weights.z, 1.0f - weights.y);
+  return moved;
 }
 
 float surface_alpha(const scene::Scene& scene, const WorldInstance& placed, std::uint32_t triangle, float u, float v) {

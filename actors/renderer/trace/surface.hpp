@@ -109,6 +109,10 @@ void bend_normal(Surface& surface, const scene::Scene& scene);
   return surface.position + surface.geometric_normal * side;
 }
 
+/// `point`, moved into its triangle by some ray offsets if it lies on an edge (at most a quarter of the height on it). A
+/// point of an edge lies in the plane of the wall that meets it there: by rounding, half of its rays begin beyond that.
+[[nodiscard]] SurfacePoint off_edges(const RayScene& scene, const SurfacePoint& point);
+
 /// Two unit vectors that make a right-handed frame with unit `n` (Duff et al., JCGT 2017).
 inline void make_frame(const glm::vec3& n, glm::vec3& tangent, glm::vec3& bitangent) {
   const float sign = std::copysign(1.0f, n.z);
