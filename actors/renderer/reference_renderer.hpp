@@ -41,11 +41,12 @@ struct ReferenceJob {
       progress;  ///< after every pass; false: save, stop, return what there is
 };
 
-/// All pictures are display-referred and linear: clamp(exposure * L) per quarter of a pixel, averaged (see below); a half
-/// may be above 1 by its noise.
+/// All pictures are display-referred and linear: clamp(exposure * L) per quarter of a pixel, averaged (see below); a
+/// half may be above 1 by its noise.
 struct ReferencePicture {
   Picture mean, half_a, half_b;
-  double own_psnr = 0;  ///< dB of the mean, from the halves: MSE = mean((sRGB(a) - sRGB(b))^2) / 4, the curve going on above 1
+  double own_psnr =
+      0;  ///< dB of the mean, from the halves: MSE = mean((sRGB(a) - sRGB(b))^2) / 4, the curve going on above 1
   std::uint64_t paths = 0;
   double seconds = 0;  ///< wall time over all runs
   std::uint32_t spp = 0;
@@ -54,10 +55,10 @@ struct ReferencePicture {
 
 /// Box filter over the pixel. Clamping one noisy path would darken the picture, so each pixel keeps its four quarters
 /// apart: paths are averaged unclamped in a quarter, the quarter is clamped where the mean of both halves is white, the
-/// quarters are averaged. What is left of the bias falls with the number of samples. Pixels of the same quarter and half depend on (seed, pixel, pass) alone:
-/// bits are equal for any number of threads, and for a run that was stopped and resumed.
-/// A state file of another picture, a damaged one and one that cannot be written are warnings (ReferenceJob::warn): the
-/// first two are written over. Errors: an invalid camera, size or exposure.
+/// quarters are averaged. What is left of the bias falls with the number of samples. Pixels of the same quarter and
+/// half depend on (seed, pixel, pass) alone: bits are equal for any number of threads, and for a run that was stopped
+/// and resumed. A state file of another picture, a damaged one and one that cannot be written are warnings
+/// (ReferenceJob::warn): the first two are written over. Errors: an invalid camera, size or exposure.
 [[nodiscard]] Result<ReferencePicture> render_reference(const LightTransport& transport, const ReferenceJob& job);
 
 /// Names what the sums of a job depend on (scene, camera, size, exposure, effects, seeds), for the name of a state

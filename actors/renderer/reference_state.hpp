@@ -34,8 +34,8 @@ struct ReferenceState {
 
   ReferenceState(std::uint64_t hash, std::uint32_t picture_width, std::uint32_t picture_height);
   /// Picture of one half, or of both together for `half` 2. A quarter is white (1) where both halves' mean is, in all
-  /// three pictures. Elsewhere a half keeps what its noise has above white: clamped by itself it would be darker than the
-  /// truth by some of its noise, in both halves alike, which cancels nowhere.
+  /// three pictures. Elsewhere a half keeps what its noise has above white: clamped by itself it would be darker than
+  /// the truth by some of its noise, in both halves alike, which cancels nowhere.
   [[nodiscard]] Picture picture(int half) const;
 };
 

@@ -109,8 +109,9 @@ void bend_normal(Surface& surface, const scene::Scene& scene);
   return surface.position + surface.geometric_normal * side;
 }
 
-/// `point`, moved into its triangle by some ray offsets if it lies on an edge (at most a quarter of the height on it). A
-/// point of an edge lies in the plane of the wall that meets it there: by rounding, half of its rays begin beyond that.
+/// `point`, moved into its triangle by some ray offsets if it lies on an edge (at most a quarter of the height on it).
+/// A point of an edge lies in the plane of the wall that meets it there: by rounding, half of its rays begin beyond
+/// that.
 [[nodiscard]] SurfacePoint off_edges(const RayScene& scene, const SurfacePoint& point);
 
 /// Two unit vectors that make a right-handed frame with unit `n` (Duff et al., JCGT 2017).
