@@ -152,11 +152,11 @@ void add_render(CLI::App& app, RenderCommand& command, Common& common, std::stri
   common.add_to(app, true);
   app.add_option("--camera", command.camera, "\"px,py,pz tx,ty,tz fovy\" or a name")->required();
   app.add_option("--size", size, "picture size")->check(kSize);
-  auto* spp =
-      app.add_option("--spp", command.spp, "samples per pixel, both halves together")->check(CLI::Range(2, 1 << 20));
-  auto* psnr =
-      app.add_option("--until-psnr", command.until_psnr, "go on until the reference's own PSNR is this many dB")
-          ->check(number(1, 100, false));
+  auto* spp = app.add_option("--spp", command.spp, "samples per pixel, both halves together; rounded up to even")
+                  ->check(CLI::Range(2, 1 << 20));
+  auto* psnr = app.add_option("--until-psnr", command.until_psnr,
+                              "stop when the reference's own PSNR is this many dB, with --spp at the latest then")
+                   ->check(number(1, 100, false));
   app.add_option("--effects", effects, "full or view-independent")->check(CLI::IsMember({"full", "view-independent"}));
   app.add_flag("--all-effects", command.all_effects,
                "compile-time plan off: every effect's code runs; the picture is the same (for comparison)");

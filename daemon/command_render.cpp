@@ -100,6 +100,11 @@ nlohmann::json report_of(const RenderCommand& command, const renderer::Reference
           {"out", command.out.string()}};
 }
 
+std::string reached_words(const renderer::ReferencePicture& picture, double wanted) {
+  return "own PSNR " + decibel_words(picture.own_psnr) + " after " + std::to_string(picture.spp) +
+         " samples per pixel, short of the " + decibel_words(wanted) + " asked for; a larger --spp goes on from there";
+}
+
 /// The report of the picture, or nothing: it was cut off, and that has been said.
 Result<std::optional<nlohmann::json>> render(const RenderCommand& command, const lifecycle::Interruption& interruption,
                                              Progress& progress) {
@@ -132,6 +137,7 @@ Result<std::optional<nlohmann::json>> render(const RenderCommand& command, const
     progress.announce(kept.words(*picture));
     return std::nullopt;
   }
+  if (job.until_psnr && picture->own_psnr < *job.until_psnr) progress.warn(reached_words(*picture, *job.until_psnr));
   if (auto written = write_pictures(command.out, *picture); !written) return std::unexpected(written.error());
   return report_of(command, *picture, job, transport);
 }

@@ -23,7 +23,10 @@ void FrameReader::check_length() {
   if (!error_.empty() || buffered() < kLengthBytes) return;
   const std::size_t length = get_length(buffer_.data() + begin_);
   if (length > limit_) {
-    error_ = "message of " + std::to_string(length) + " bytes is over the limit of " + std::to_string(limit_);
+    constexpr std::size_t kHttp = 0x48545450;  // the letters
+    error_ = length == kHttp
+                 ? "the other end speaks HTTP: is this its port for browsers?"
+                 : "message of " + std::to_string(length) + " bytes is over the limit of " + std::to_string(limit_);
     buffer_ = {};
     begin_ = 0;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 
 namespace darm::scene {
 namespace {
@@ -12,6 +13,7 @@ constexpr float kRough = 0.6f;  // from here on a dielectric's coat shows no mor
 constexpr std::uint32_t kGrid = 32;
 constexpr float kSharpest = 0.1f;  // share of the points whose roughness decides
 
+float linear(float code) { return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f); }
 float srgb(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f; }
 
 // Texel of an image at grid point (x, y); white without one. Raw bytes: nobody sees a curve in an estimate.
@@ -89,6 +91,19 @@ ViewMaterial view_material(const Scene& scene, const Material& m) {
   const bool detailed = m.normal_texture.present() || (m.metallic > 0 && m.base_color_texture.present());
   if (detailed && out.coarser > 0) --out.coarser;
   return out;
+}
+
+glm::vec3 mean_passage(const Scene& scene, const Material& m) {
+  if (!(m.transmission > 0) || m.thickness > 0) return glm::vec3(0.0f);
+  glm::vec3 sum(0.0f);
+  for (std::uint32_t y = 0; y < kGrid; ++y)
+    for (std::uint32_t x = 0; x < kGrid; ++x) {
+      const glm::vec4 tint = texel(scene, m.base_color_texture, x, y);
+      const float clear = m.transmission * texel(scene, m.transmission_texture, x, y).x *
+                          (1.0f - m.metallic * texel(scene, m.metallic_roughness_texture, x, y).z);
+      for (int c = 0; c < 3; ++c) sum[c] += m.base_color[c] * linear(tint[c]) * clear;
+    }
+  return glm::clamp(sum / static_cast<float>(kGrid * kGrid), 0.0f, 1.0f);
 }
 
 std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialOptions& options) {

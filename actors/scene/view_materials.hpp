@@ -28,6 +28,11 @@ struct ViewMaterialOptions {
 /// lobes so narrow that they show what they reflect. Of the material: RMS over the points.
 [[nodiscard]] ViewMaterial view_material(const Scene& scene, const Material& material);
 
+/// What a thin clear surface passes of what is straight behind it, as a mean over a grid of points of its textures:
+/// linear base colour * transmission * (1 - metallic), 0..1 a channel. Black where nothing comes through straight: no
+/// transmission, or a volume, which refracts.
+[[nodiscard]] glm::vec3 mean_passage(const Scene& scene, const Material& material);
+
 /// One per instance. All weights are 0 if nothing in the scene calls for a private layer.
 [[nodiscard]] std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialOptions& options = {});
 

@@ -86,9 +86,11 @@ void put_instances(const scene::Scene& scene, const atlas::Layout& layout, wire:
     info->set_alpha_mode(static_cast<std::uint32_t>(material.alpha_mode));
     // Coverage is the share of a texel that passes the material's own cutoff: half of it is where the edge runs.
     info->set_alpha_cutoff(0.5f);
-    // Only a thin wall lets what is straight behind it through; volumes refract and are opaque tiles.
-    info->set_transmission(material.thickness > 0 ? 0.0f : material.transmission);
-    info->set_tint_rgb(pack_srgb(glm::vec3(material.base_color)));
+    // Where no private tile says it point by point, all of the surface passes what it does in the mean.
+    const glm::vec3 passage = scene::mean_passage(scene, material);
+    const float most = std::max({passage.x, passage.y, passage.z});
+    info->set_transmission(most);
+    info->set_tint_rgb(pack_srgb(most > 0 ? passage / most : glm::vec3(1.0f)));
     // Own light is not dimmed by Fresnel's term; what glows and is glossy too keeps the average.
     const float ratio = (material.ior - 1.0f) / (material.ior + 1.0f);
     if (view[i].weight > 0 && !material.emits()) info->set_f0(ratio * ratio);
@@ -99,9 +101,9 @@ void put_instances(const scene::Scene& scene, const atlas::Layout& layout, wire:
 }
 
 void put_surroundings(const scene::Scene& scene, float exposure, wire::SceneManifest& m) {
-  m.set_sky_rgb_zenith(pack_srgb(scene.sky.zenith * exposure));
-  m.set_sky_rgb_horizon(pack_srgb(scene.sky.horizon * exposure));
-  m.set_sky_rgb_ground(pack_srgb(scene.sky.ground * exposure));
+  constexpr float kMost = 1e30f;  // a product of two large numbers stays one
+  for (const glm::vec3& light : {scene.sky.zenith, scene.sky.horizon, scene.sky.ground})
+    for (int c = 0; c < 3; ++c) m.add_sky(std::clamp(light[c] * exposure, 0.0f, kMost));
   for (const auto& light : scene.lights) {
     if (light.kind != scene::LightKind::kDirectional || !(light.angular_diameter > 0)) continue;
     // The disc's radiance is its irradiance over its projected solid angle, pi sin^2 of the angular radius.

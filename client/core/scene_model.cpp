@@ -196,9 +196,14 @@ Result<void> SceneModel::read_surroundings(const wire::SceneManifest& manifest) 
     return fail("manifest: bounds are not six finite numbers");
   low_ = {manifest.bounds(0), manifest.bounds(1), manifest.bounds(2)};
   high_ = {manifest.bounds(3), manifest.bounds(4), manifest.bounds(5)};
-  background_.zenith = unpack_linear(manifest.sky_rgb_zenith());
-  background_.horizon = unpack_linear(manifest.sky_rgb_horizon());
-  background_.ground = unpack_linear(manifest.sky_rgb_ground());
+  if (manifest.sky_size() != 9 || !all_finite(manifest.sky()))
+    return fail("manifest: the sky is not nine finite numbers");
+  const auto sky = [&](int at) {
+    return glm::max(glm::vec3(manifest.sky(at), manifest.sky(at + 1), manifest.sky(at + 2)), glm::vec3(0.0f));
+  };
+  background_.zenith = sky(0);
+  background_.horizon = sky(3);
+  background_.ground = sky(6);
   if (manifest.sun_size() == 0) return {};
   if (manifest.sun_size() != 7 || !all_finite(manifest.sun()))
     return fail("manifest: the sun is not seven finite numbers");

@@ -29,7 +29,7 @@ function manifest(): SceneManifest {
       {density: 4, width: 30, height: 30, tilesX: 1, tilesY: 1}],
     instances: [{chart: 0, toWorld: [...identity], frontBase: 0, backBase: 0xffffffff, transmission: 3,
       tintRgb: 0xff0000}],
-    origin: {x: 1, y: 2, z: 3},
+    origin: {x: 1, y: 2, z: 3}, sky: [0, 0, 4, 0.5, 0.5, 0.5, -1, 0, 0],
   });
 }
 
@@ -43,6 +43,7 @@ test('a manifest is read, its levels follow each other in the page table', () =>
   assert.deepEqual(scene.origin, [1, 2, 3]);
   assert.equal(scene.instances[0]!.transmission, 1);
   assert.ok(scene.hasClear && !scene.hasAlpha);
+  assert.deepEqual(scene.background, {zenith: [0, 0, 4], horizon: [0.5, 0.5, 0.5], ground: [0, 0, 0], sun: null});
   assert.equal(scene.coarseCoverage, null);
   const cut = manifest();
   cut.coarseCoverage = pack(new Uint8Array(900).fill(9));
@@ -56,7 +57,8 @@ test('a manifest that contradicts itself is refused', () => {
     (m) => (m.patchTable = new Uint8Array(5)), (m) => (m.bounds = [1, 2]), (m) => (m.bounds[3] = Infinity),
     (m) => (m.instances[0]!.chart = 1), (m) => (m.instances[0]!.toWorld[5] = NaN), (m) => (m.instances[0]!.toWorld = []),
     (m) => (m.instances[0]!.frontBase = 2), (m) => (m.instances[0]!.backBase = 7), (m) => (m.instances[0]!.alphaMode = 3),
-    (m) => (m.instances[0]!.f0 = NaN), (m) => (m.sun = [1, 2, 3]), (m) => (m.sun = [0, 0, 0, 1, 1, 1, 1]),
+    (m) => (m.instances[0]!.f0 = NaN), (m) => (m.sky = [1, 2, 3]), (m) => (m.sky[8] = NaN),
+    (m) => (m.sun = [1, 2, 3]), (m) => (m.sun = [0, 0, 0, 1, 1, 1, 1]),
     (m) => (m.coarseCoverage = new Uint8Array(3)), (m) => (m.coarseCoverage = pack(new Uint8Array(899))),
     (m) => (m.coarseCoverage = pack(new Uint8Array(901))), (m) => (m.geometryChunks = 2 ** 31), (m) => (m.origin!.x = Infinity),
     (m) => (m.levels = Array.from({length: 17}, () => m.levels[0]!)),

@@ -206,6 +206,19 @@ TEST_F(RendererGles, DrawsTheSkyByDirectionBlendedInLinearLight) {
   EXPECT_NEAR(pixel(down, 16, 16)[2], 0x10, 1);
 }
 
+// White is where the light is, not where three clamped numbers are blended.
+TEST_F(RendererGles, ASkyBrighterThanWhiteIsClampedWhereItIsSeen) {
+  auto manifest = synthetic::manifest();
+  for (int c = 0; c < 3; ++c) {
+    manifest.set_sky(c, c == 2 ? 4.0f : 0.25f);  // zenith: blue beyond white
+    manifest.set_sky(3 + c, 0.25f);
+  }
+  build(manifest);
+  const Colour c = pixel(draw(look_at({1, 1, 5}, {1, 2, 5 + std::sqrt(3.0)}, 1, 33, 33)), 16, 16);  // direction.y = 0.5
+  EXPECT_NEAR(c[0], 255 * linear_to_srgb(0.25f), 1.5);
+  EXPECT_EQ(c[2], 255) << "half way to 4 is 2.1; to 1 it would be .6";
+}
+
 TEST_F(RendererGles, LooksThroughTheBackOfASingleSidedInstance) {
   auto manifest = synthetic::manifest();
   manifest.mutable_instances(0)->set_camera_sees_back(false);
@@ -330,7 +343,7 @@ TEST_F(RendererGles, WhatHasNoSlotIsCutByTheCoverageOfCoarseTex) {
     manifest.mutable_instances(0)->set_alpha_mode(1);
     manifest.mutable_instances(0)->set_alpha_cutoff(0.5f);
     manifest.set_coarse_coverage(synthetic::deflate(std::string(std::size_t{30} * 30, alpha)));
-    manifest.set_sky_rgb_horizon(0);
+    synthetic::set_sky(manifest, 0x4060ff, 0, 0x402010);
     build(manifest);
     const auto view = look_at({1, 1, 1}, {1, 1, 0}, 90, 64, 64);
     const Image8 image = draw(view);  // nothing has come yet
@@ -345,9 +358,7 @@ TEST_F(RendererGles, TheFarSideOfABlendedBodyLiesUnderItsNearOne) {
   for (const bool near_first : {false, true}) {
     auto manifest = synthetic::manifest();
     manifest.mutable_instances(0)->set_alpha_mode(2);
-    for (auto set : {&wire::SceneManifest::set_sky_rgb_zenith, &wire::SceneManifest::set_sky_rgb_horizon,
-                     &wire::SceneManifest::set_sky_rgb_ground})
-      (manifest.*set)(0);
+    synthetic::set_sky(manifest, 0, 0, 0);
     build(manifest, synthetic::two_sheets(near_first));
     auto frame = synthetic::key_frame(
         [](std::uint32_t level, int x, int) {

@@ -60,6 +60,14 @@ inline wire::InstanceInfo instance_at(float x, float y, float z) {
   return i;
 }
 
+/// Colours as 0xRRGGBB, sRGB.
+inline void set_sky(wire::SceneManifest& m, std::uint32_t zenith, std::uint32_t horizon, std::uint32_t ground) {
+  m.clear_sky();
+  for (const auto colour : {zenith, horizon, ground})
+    for (const int shift : {16, 8, 0})
+      m.add_sky(srgb_to_linear(static_cast<float>((colour >> shift) & 0xffu) / 255.0f));
+}
+
 inline wire::SceneManifest manifest() {
   wire::SceneManifest m;
   m.set_q(kQ);
@@ -79,9 +87,7 @@ inline wire::SceneManifest manifest() {
   m.set_chart_count(1);
   m.set_geometry_chunks(1);
   for (const float b : {0.f, 0.f, -1.f, 2.f, 2.f, 1.f}) m.add_bounds(b);
-  m.set_sky_rgb_zenith(0x4060ff);
-  m.set_sky_rgb_horizon(0x808080);
-  m.set_sky_rgb_ground(0x402010);
+  set_sky(m, 0x4060ff, 0x808080, 0x402010);
   return m;
 }
 

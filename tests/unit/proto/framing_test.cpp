@@ -80,6 +80,16 @@ TEST(FrameReader, refuses_the_second_message_too) {
   EXPECT_FALSE(reader.next(e).has_value());
 }
 
+TEST(FrameReader, knows_a_port_for_browsers) {
+  FrameReader reader(kMaxServerEnvelope);
+  const std::string reply = "HTTP/1.1 400 Bad Request\r\n\r\n";
+  reader.feed({reinterpret_cast<const std::uint8_t*>(reply.data()), reply.size()});
+  wire::Envelope e;
+  const auto result = reader.next(e);
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().find("HTTP"), std::string::npos) << result.error();
+}
+
 TEST(FrameReader, names_bytes_that_are_no_envelope) {
   FrameReader reader(1024);
   const std::array<std::uint8_t, 7> bad{0, 0, 0, 3, 0xff, 0xff, 0xff};

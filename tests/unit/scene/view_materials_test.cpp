@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
+
 namespace darm::scene {
 namespace {
 
@@ -54,6 +57,34 @@ TEST(ViewMaterials, beside_a_mirror_rough_surfaces_join_at_coarse_levels) {
   EXPECT_GT(weights[0].weight, 0.0f);
   EXPECT_EQ(weights[0].coarser, 3);
   EXPECT_EQ(weights[2].weight, 0.0f) << "nothing is reflected without a boundary";
+}
+
+TEST(ViewMaterials, a_pane_passes_the_mean_of_what_its_textures_let_through) {
+  Material pane = plaster(0);
+  pane.base_color = glm::vec4(1, 0.5f, 0, 1);
+  pane.transmission = 0.8f;
+  auto scene = scene_of({pane});
+  const auto near = [](const glm::vec3& a, const glm::vec3& b) {
+    return glm::all(glm::lessThan(glm::abs(a - b), glm::vec3(1e-5f)));
+  };
+  EXPECT_TRUE(near(mean_passage(scene, pane), {0.8f, 0.4f, 0}));
+  pane.metallic = 0.5f;
+  EXPECT_TRUE(near(mean_passage(scene, pane), {0.4f, 0.2f, 0}));
+  // Stripes: one half is metal, the other is not, and the metal's tint does not count.
+  auto& stripes = scene.images.emplace_back();
+  stripes.width = 2;
+  stripes.height = 1;
+  stripes.pixels = {0, 0, 0, 255, 0, 0, 255, 255};
+  auto& tint = scene.images.emplace_back(stripes);
+  tint.pixels = {255, 188, 0, 255, 255, 255, 255, 255};
+  pane.metallic = 1;
+  pane.metallic_roughness_texture.image = 0;
+  pane.base_color_texture.image = 1;
+  const glm::vec3 passed = mean_passage(scene, pane);
+  EXPECT_NEAR(passed.x, 0.4f, 1e-5f);
+  EXPECT_NEAR(passed.y, 0.4f * 0.5f * 0.503f, 1e-3f) << "sRGB 188 is linear .503";
+  pane.thickness = 0.1f;
+  EXPECT_EQ(mean_passage(scene, pane), glm::vec3(0.0f)) << "a volume refracts";
 }
 
 TEST(ViewMaterials, polish_metal_and_glass_call_for_it) {

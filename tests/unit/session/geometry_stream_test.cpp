@@ -263,8 +263,9 @@ TEST(GeometryStream, the_manifest_describes_levels_patches_instances_and_sky) {
   EXPECT_EQ(m.instances(0).alpha_cutoff(), 0.5f) << "coverage is the share that passes the material's own";
   EXPECT_TRUE(m.instances(0).camera_sees_back());
   EXPECT_TRUE(m.instances(0).dynamic());
-  EXPECT_EQ(m.sky_rgb_zenith(), 0xffffffu);  // 0.5 nits at exposure 2 is white
-  EXPECT_EQ(m.sky_rgb_ground(), 0u);
+  ASSERT_EQ(m.sky_size(), 9);
+  EXPECT_EQ(m.sky(0), 1.0f);  // 0.5 nits at exposure 2 is white
+  EXPECT_EQ(m.sky(8), 0.0f);
   ASSERT_EQ(m.sun_size(), 7);
   EXPECT_FLOAT_EQ(m.sun(1), 1.0f);
 }

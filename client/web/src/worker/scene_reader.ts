@@ -127,11 +127,9 @@ function readInstance(info: InstanceInfo, manifest: SceneManifest): InstanceShap
 }
 
 function readBackground(manifest: SceneManifest): Background {
-  const sky = {
-    zenith: unpackLinear(manifest.skyRgbZenith),
-    horizon: unpackLinear(manifest.skyRgbHorizon),
-    ground: unpackLinear(manifest.skyRgbGround),
-  };
+  check(manifest.sky.length === 9 && finite(manifest.sky), 'manifest: the sky is not nine finite numbers');
+  const light = (at: number): Vec3 => [0, 1, 2].map((c) => Math.max(0, manifest.sky[at + c]!)) as Vec3;
+  const sky = {zenith: light(0), horizon: light(3), ground: light(6)};
   const s = manifest.sun;
   if (s.length === 0) return {...sky, sun: null};
   check(s.length === 7 && finite(s), 'manifest: the sun is not seven finite numbers');
