@@ -25,6 +25,14 @@ export class Notices {
       a.textContent = sentence.link.label;
       this.alertBox.append(a);
     }
+    if (sentence.reload) {
+      // No link: one to this very address, with its #view, would load nothing.
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.textContent = 'Reload';
+      button.addEventListener('click', () => location.reload());
+      this.alertBox.append(button);
+    }
     this.alertBox.hidden = false;
   }
 
