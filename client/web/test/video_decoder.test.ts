@@ -64,12 +64,25 @@ test('a decoder that holds pictures back is given up, and the next is in softwar
   const decoder = fresh();
   for (let i = 0; i < 2; ++i) {
     const waiting = assert.rejects(decoder.decode(key, true, i), /was reset/);
-    await browser.pass(3100);
+    await browser.pass(10_100);
     await waiting;
   }
   assert.deepEqual(ScriptedVideoDecoder.software, [false, false], 'once may be a machine that slept');
   await decoder.decode(key, true, 3);
   assert.deepEqual(ScriptedVideoDecoder.software, [false, false, true]);
+});
+
+test('a still is waited for as long as it takes', async () => {
+  ScriptedVideoDecoder.holdsBack = true;
+  ScriptedVideoDecoder.software.length = 0;
+  const decoder = new PictureDecoder((bytes) => new ArrayBuffer(bytes), true);
+  let given = false;
+  void decoder.decode(key, true, 1).then(() => (given = true), () => (given = true));
+  await browser.pass(60_000);
+  assert.ok(!given);
+  decoder.reset();
+  await browser.settle();
+  assert.ok(given);
 });
 
 test('pictures that cannot be read are asked for in software once; then it is said', async () => {

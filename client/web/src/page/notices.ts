@@ -16,6 +16,7 @@ export class Notices {
 
   /** The reason why there is no picture, and the way out. */
   alert(sentence: Sentence): void {
+    this.quiet('');
     const line = document.createElement('p');
     line.textContent = sentence.text;
     this.alertBox.replaceChildren(line);

@@ -23,8 +23,11 @@ export function splitChroma(interleaved: Uint8Array, cb: Uint8Array, cr: Uint8Ar
   }
 }
 
-/** A picture that is not out by then is held back by the decoder, which waits for more: none would ever come. */
-const kHeldBackMs = 3000;
+/**
+ * A picture that is not out by then is held back by the decoder, which waits for more: none would ever come. Long, because
+ * fourteen pages on two cores take seconds too. Stills are flushed, and cannot be held back.
+ */
+const kHeldBackMs = 10_000;
 
 type Waiting = {timestamp: number; resolve: (frame: VideoFrame) => void; reject: (error: Error) => void};
 
@@ -49,7 +52,7 @@ export class PictureDecoder {
     let late: ReturnType<typeof setTimeout> | undefined;
     const frame = await new Promise<VideoFrame>((resolve, reject) => {
       this.waiting = {timestamp, resolve, reject};
-      late = setTimeout(() => this.giveUpWaiting(), kHeldBackMs);
+      if (!this.still) late = setTimeout(() => this.giveUpWaiting(), kHeldBackMs);
       decoder.decode(new EncodedVideoChunk({type: key ? 'key' : 'delta', timestamp, data: h264}));
       if (this.still) decoder.flush().catch(reject);
     }).finally(() => clearTimeout(late));
