@@ -272,3 +272,35 @@ test('a line that opens neither nor fails is given up', async () => {
   assert.equal(browser.lines, before + 1);
   page.session.close();
 });
+
+test('a CoarseTex whose decoder is taken away once is decoded again; twice is said', async () => {
+  let losses = 1;
+  class Decoder {
+    state = 'configured';
+    constructor(private readonly to: {output: (frame: unknown) => void; error: (error: Error) => void}) {}
+    configure(): void {}
+    close(): void {}
+    flush = async (): Promise<void> => {};
+    decode({timestamp}: {timestamp: number}): void {
+      if (losses-- > 0) return this.to.error(new Error('reclaimed'));
+      this.to.output({timestamp, format: 'I420', visibleRect: {width: 30, height: 30}, close: () => {}, copyTo: async () => []});
+    }
+  }
+  Object.assign(globalThis, {VideoDecoder: Decoder, EncodedVideoChunk: class {
+    constructor(init: object) {
+      Object.assign(this, init);
+    }
+  }});
+  const page = await joinedPage();
+  await manifest();
+  const h264 = new Uint8Array([0, 0, 0, 1, 0x67, 0x64, 0x00, 0x32, 1]);
+  const coarse = {case: 'coarse', value: create(CoarseTextureSchema, {width: 30, height: 30, version: 1, h264})} as const;
+  browser.line.say(coarse);
+  await browser.settle();
+  assert.equal(page.all('coarse').length, 1);
+  assert.equal(page.all('out').length, 0);
+  losses = 2;
+  browser.line.say(coarse);
+  await browser.settle();
+  assert.equal(page.last('out').reason, 'fault');
+});
