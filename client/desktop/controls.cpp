@@ -128,6 +128,8 @@ HeldKeys Controls::held_keys() const {
   k.down = down(GLFW_KEY_Q) || down(GLFW_KEY_PAGE_DOWN);
   k.turn_left = down(GLFW_KEY_LEFT);
   k.turn_right = down(GLFW_KEY_RIGHT);
+  k.look_up = down(GLFW_KEY_R);
+  k.look_down = down(GLFW_KEY_F);
   k.hurry = down(GLFW_KEY_LEFT_SHIFT) || down(GLFW_KEY_RIGHT_SHIFT);
   return k;
 }

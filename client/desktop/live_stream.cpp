@@ -206,6 +206,7 @@ Result<void> LiveStream::begin_scene(const wire::SceneManifest& manifest) {
   auto copy = std::make_unique<SceneModel>(*scene_);
   post([&](Arrivals& a) {
     a.scene = std::move(copy);
+    a.scene_name = manifest.name();
     a.chunks.clear();
     a.shared = {};
     a.view = {};

@@ -33,6 +33,7 @@ struct Joined {
 struct Arrivals {
   std::optional<Joined> joined;
   std::unique_ptr<SceneModel> scene;  ///< a new one, without geometry; the old one is void
+  std::string scene_name;             ///< of `scene`
   std::vector<Chunk> chunks;          ///< of the newest scene
   StreamNews shared, view;
   std::int64_t answers_us = 0;    ///< when the newest camera that a frame answers was sent, by now_us(); 0: none

@@ -81,9 +81,10 @@ void declare(CLI::App& app, Arguments& a) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, GlKind>{{"auto", GlKind::kAuto}, {"es", GlKind::kEs}, {"desktop", GlKind::kDesktop}}));
   app.footer(
-      "W A S D and arrows walk, Q and E go down and up, Shift hurries, dragging looks around; O changes to orbiting,\n"
-      "P shows measurements, H hides all but the scene, L copies a link, F12 saves a picture, F11 fills the screen,\n"
-      "Ctrl Q leaves. A gamepad's left stick walks, its right stick looks.");
+      "W A S D and arrows walk, Q and E go down and up, R and F look up and down, Shift hurries, dragging looks "
+      "around;\n"
+      "O changes to orbiting, P shows measurements, H hides all but the scene, L copies a link, F12 saves a picture,\n"
+      "F11 fills the screen, Ctrl Q leaves. A gamepad's left stick walks, its right stick looks.");
 }
 
 }  // namespace

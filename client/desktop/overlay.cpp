@@ -19,8 +19,9 @@ constexpr ImGuiWindowFlags kPlain = ImGuiWindowFlags_NoDecoration | ImGuiWindowF
                                     ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                                     ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
 
-constexpr std::array<std::array<const char*, 2>, 11> kHelp = {{{"W A S D, arrows", "walk and turn"},
+constexpr std::array<std::array<const char*, 2>, 12> kHelp = {{{"W A S D, arrows", "walk and turn"},
                                                                {"Q, E", "down, up"},
+                                                               {"R, F", "look up, down"},
                                                                {"Shift", "hurry"},
                                                                {"Drag, wheel", "look, go ahead"},
                                                                {"O", "walk or orbit"},

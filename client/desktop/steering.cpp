@@ -9,8 +9,9 @@ namespace {
 constexpr double kTurnSpeed = 1.2;       // radians a second, by key
 constexpr double kStickTurnSpeed = 2.2;  // radians a second, stick fully over
 constexpr double kDeadZone = 0.15;
-constexpr double kStridesAcross = 20;  // of a drag across the window
-constexpr double kMostSteps = 5;       // of one turn of the wheel
+constexpr double kStridesAcross = 20;                      // of a drag across the window
+constexpr double kMostSteps = 5;                           // of one turn of the wheel
+constexpr double kFirstStep = 0.016, kLongestStep = 0.25;  // seconds
 
 }  // namespace
 
@@ -23,6 +24,7 @@ double axis_of(double value) {
 void add(Steering& s, const HeldKeys& k) {
   s.wish += glm::dvec3(k.right - k.left, k.up - k.down, k.ahead - k.back);
   s.yaw += (k.turn_left - k.turn_right) * kTurnSpeed;
+  s.pitch += (k.look_up - k.look_down) * kTurnSpeed;
   s.hurry = s.hurry || k.hurry;
 }
 
@@ -31,6 +33,10 @@ void add(Steering& s, const Sticks& pad) {
   s.yaw -= axis_of(pad.right[0]) * kStickTurnSpeed;
   s.pitch -= axis_of(pad.right[1]) * kStickTurnSpeed;
   s.hurry = s.hurry || pad.hurry;
+}
+
+double step_seconds(double since_ms, bool rested) {
+  return rested ? kFirstStep : std::clamp(since_ms / 1000, 0.0, kLongestStep);
 }
 
 bool steer(Rig& rig, const Steering& steering, double seconds) {

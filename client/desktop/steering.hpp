@@ -11,7 +11,7 @@ namespace darm::client::desktop {
 /// What is held down now.
 struct HeldKeys {
   bool ahead = false, back = false, left = false, right = false, up = false, down = false;
-  bool turn_left = false, turn_right = false, hurry = false;
+  bool turn_left = false, turn_right = false, look_up = false, look_down = false, hurry = false;
 };
 
 /// A gamepad in the usual layout.
@@ -34,6 +34,10 @@ struct Steering {
 [[nodiscard]] double axis_of(double value);
 void add(Steering& steering, const HeldKeys& keys);
 void add(Steering& steering, const Sticks& pad);
+
+/// Seconds that a hand moves the view in one step of the loop, `since_ms` after the last. Having `rested`, the time
+/// since then says nothing, and the step is a short one, not a leap; a slow device walks no slower than a quick one.
+[[nodiscard]] double step_seconds(double since_ms, bool rested);
 
 /// Moves the rig for `seconds`; true while something moves it.
 bool steer(Rig& rig, const Steering& steering, double seconds);

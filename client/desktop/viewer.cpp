@@ -43,11 +43,12 @@ class Viewer {
   Result<void> run();
 
  private:
-  void move(double seconds);
+  void move(double since, bool rested);
   Result<void> take_arrivals();
   void take_answer();
   void note_lag(double ms);
   void follow(const Arrivals& arrivals);
+  void enter(const SceneModel& scene, std::string name);
   Result<void> draw(std::uint32_t divisor);
   Result<void> draw_if_due();
   void note_drawn(double begin, double end, std::uint32_t divisor);
@@ -78,7 +79,9 @@ class Viewer {
   const double start_ms_ = now_ms();
   double last_step_ms_ = start_ms_, panel_ms_ = 0, whole_ms_ = 0;
   bool placed_ = false;  // by the plan or by hand: the server's start does not move it
-  bool camera_new_ = true, drew_ = false, bounds_set_ = false;
+  bool camera_new_ = true, drew_ = false;
+  UprightView start_;                      // where the server's scene is entered
+  std::optional<std::string> scene_name_;  // none: no scene has come yet
   std::int64_t answers_us_ = 0;
   std::uint64_t frame_ = 0, counted_bytes_ = 0;
   VisitFigures figures_;
@@ -101,8 +104,9 @@ Result<void> Viewer::run() {
   if (placed_) server.view = view();
   stream_ = std::make_unique<LiveStream>(std::move(server), &Window::wake);
   while (!window_->closing() && !time_over()) {
-    window_->wait(patience());
-    move(std::exchange(last_step_ms_, now_ms()));
+    const double pause = patience();
+    window_->wait(pause);
+    move(std::exchange(last_step_ms_, now_ms()), pause > 0);
     if (auto ok = draw_if_due(); !ok) return ok;
     if (auto ok = present(); !ok) return ok;
   }
@@ -120,12 +124,10 @@ double Viewer::patience() const {
   return wait;
 }
 
-void Viewer::move(double since) {
+void Viewer::move(double since, bool rested) {
   const double now = now_ms();
-  // After a pause the first step is a short one, not a leap.
-  const double seconds = now - since > 100 ? 0.016 : (now - since) / 1000;
   for (const Action action : controls_->take_actions()) obey(action);
-  bool moved = controls_->advance(seconds, overlay_->takes_mouse());
+  bool moved = controls_->advance(step_seconds(now - since, rested), overlay_->takes_mouse());
   if (plan_.turn != 0 && stage_.ready()) {
     const double yaw = plan_.turn * kDegree * (now - since) / 1000;
     rig_.mode == Mode::kOrbit ? rig_.orbit(yaw, 0) : rig_.look(yaw, 0);
@@ -137,7 +139,8 @@ void Viewer::move(double since) {
     pace_.moved(now);
   }
   if (moved) {
-    placed_ = camera_new_ = true;
+    placed_ = placed_ || stage_.ready();  // whoever cannot wait begins at the start all the same
+    camera_new_ = true;
     pace_.moved(now);
   }
   take_answer();
@@ -161,15 +164,36 @@ void Viewer::note_lag(double ms) {
 }
 
 void Viewer::follow(const Arrivals& a) {
+  if (a.joined) {
+    answers_us_ = 0;
+    start_ = upright(a.joined->start);
+  }
   if (a.joined && !placed_) {
-    rig_.view = upright(a.joined->start);
+    rig_.view = start_;
     camera_new_ = true;
   }
-  if (a.joined) answers_us_ = 0;
   answers_us_ = std::max(answers_us_, a.answers_us);
   if (a.frame > 0) frame_ = a.frame;
   for (const double ms : a.decode_ms) figures_.decode_ms.add(ms);
   figures_.stream_frames += a.decode_ms.size();
+}
+
+// A scene has come. One that was watched before keeps the hand where it was; in another one that is no place.
+void Viewer::enter(const SceneModel& scene, std::string name) {
+  const bool same = scene_name_ == name;
+  const bool other = scene_name_ && !same;
+  scene_name_ = std::move(name);
+  if (other) {
+    rig_.stop();
+    rig_.view = start_;
+    camera_new_ = true;
+  }
+  const auto mode = rig_.mode;
+  const auto pivot = rig_.pivot;
+  rig_.set_bounds({scene.origin() + glm::dvec3(scene.low()), scene.origin() + glm::dvec3(scene.high())});
+  if (!same) return;
+  rig_.mode = mode;
+  rig_.pivot = pivot;
 }
 
 Result<void> Viewer::take_arrivals() {
@@ -177,20 +201,12 @@ Result<void> Viewer::take_arrivals() {
   Arrivals arrivals = stream_->take();
   follow(arrivals);
   const bool new_scene = arrivals.scene != nullptr;
+  std::string name = std::move(arrivals.scene_name);
   const double before = now_ms();
   const auto uploaded = stage_.take(std::move(arrivals));
   if (!uploaded) return std::unexpected(uploaded.error());
   if (*uploaded) figures_.upload_ms.add(now_ms() - before);
-  if (new_scene && stage_.scene() != nullptr) {
-    const SceneModel& scene = *stage_.scene();
-    const auto mode = rig_.mode;
-    const auto pivot = rig_.pivot;
-    rig_.set_bounds({scene.origin() + glm::dvec3(scene.low()), scene.origin() + glm::dvec3(scene.high())});
-    if (std::exchange(bounds_set_, true)) {  // the hand keeps what it had
-      rig_.mode = mode;
-      rig_.pivot = pivot;
-    }
-  }
+  if (new_scene && stage_.scene() != nullptr) enter(*stage_.scene(), std::move(name));
   if (camera_new_ && size_.width > 0) {
     camera_new_ = false;
     stream_->look(view());

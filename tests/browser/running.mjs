@@ -1,7 +1,7 @@
 // Starts the real daemon and a real browser for the tests of the web client.
 import assert from 'node:assert/strict';
 import {execFile, execFileSync, spawn} from 'node:child_process';
-import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
+import {mkdtempSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
 import {createServer, connect} from 'node:net';
 import {createRequire} from 'node:module';
 import {tmpdir} from 'node:os';
@@ -30,8 +30,8 @@ export function folder() {
   return {path, remove: () => rmSync(path, {recursive: true, force: true})};
 }
 
-export function browse(...flags) {
-  return chromium.launch({executablePath: process.env.DARM_CHROMIUM, headless: true, args: [...kFlags, ...flags]});
+export function browse({flags = [], ...more} = {}) {
+  return chromium.launch({executablePath: process.env.DARM_CHROMIUM, headless: true, args: [...kFlags, ...flags], ...more});
 }
 
 /** darmd serve, on the default scene if no other is named; `web` is its port. */
@@ -159,4 +159,54 @@ export async function lagging(port, delay) {
   });
   await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
   return {port: server.address().port, close: () => server.close()};
+}
+
+/** Passes bytes on to `port`, until they are cut(): all lines at once, without a word. */
+export async function cutting(port) {
+  const ends = new Set();
+  const server = createServer((near) => {
+    const far = connect(port, '127.0.0.1');
+    for (const [from, to] of [[near, far], [far, near]]) {
+      ends.add(from);
+      from.pipe(to);
+      from.on('error', () => to.destroy());
+      from.on('close', () => ends.delete(from));
+    }
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const cut = () => ends.forEach((end) => end.destroy());
+  return {port: server.address().port, cut, close: () => {
+    server.close();
+    cut();
+  }};
+}
+
+/** A glTF file of a yard: a cube without its top, edges of `size` metres, each side of another colour, no lights. */
+export function boxScene(path, size) {
+  const sides = [[0, 0], [0, 1], [1, 0], [2, 0], [2, 1]];
+  const positions = new Float32Array(sides.length * 12);
+  sides.forEach(([axis, side], i) => [[0, 0], [1, 0], [0, 1], [1, 1]].forEach(([a, b], corner) => {
+    const place = [0, 0, 0];
+    place[axis] = side;
+    place[(axis + 1) % 3] = a;
+    place[(axis + 2) % 3] = b;
+    positions.set(place.map((v) => v * size), i * 12 + corner * 3);
+  }));
+  const indices = new Uint16Array([0, 1, 2, 2, 1, 3]);
+  const bytes = Buffer.concat([Buffer.from(positions.buffer), Buffer.from(indices.buffer)]);
+  const colours = [[0.8, 0.2, 0.2], [0.2, 0.8, 0.2], [0.7, 0.7, 0.7], [0.2, 0.2, 0.8], [0.8, 0.8, 0.2]];
+  writeFileSync(path, JSON.stringify({
+    asset: {version: '2.0'}, scene: 0, scenes: [{nodes: [0]}], nodes: [{mesh: 0}],
+    meshes: [{primitives: sides.map((_, i) => ({attributes: {POSITION: i}, indices: sides.length, material: i}))}],
+    materials: colours.map((c) => ({doubleSided: true, pbrMetallicRoughness: {baseColorFactor: [...c, 1], metallicFactor: 0}})),
+    accessors: [...sides.map((_, i) => {
+      const points = [0, 1, 2, 3].map((corner) => [...positions.subarray(i * 12 + corner * 3, i * 12 + corner * 3 + 3)]);
+      return {bufferView: 0, byteOffset: i * 48, componentType: 5126, count: 4, type: 'VEC3',
+        min: [0, 1, 2].map((axis) => Math.min(...points.map((p) => p[axis]))),
+        max: [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis])))};
+    }), {bufferView: 1, componentType: 5123, count: 6, type: 'SCALAR'}],
+    bufferViews: [{buffer: 0, byteLength: positions.byteLength},
+      {buffer: 0, byteOffset: positions.byteLength, byteLength: indices.byteLength}],
+    buffers: [{byteLength: bytes.length, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}`}],
+  }));
 }

@@ -10,7 +10,7 @@ const state = folder();
 let browser;
 
 before(async () => {
-  browser = await browse('--host-resolver-rules=MAP darm.test 127.0.0.1');
+  browser = await browse({flags: ['--host-resolver-rules=MAP darm.test 127.0.0.1']});
 });
 after(async () => {
   await browser?.close();

@@ -10,12 +10,13 @@ import {meaningOf, retryDelay} from '../src/worker/stream_socket.js';
 import {codecOf, splitChroma} from '../src/worker/video_decoder.js';
 
 test('what is missing is said with the way out', () => {
-  const all = {secure: true, webCodecs: true, webGl2: true, href: 'http://host:9080/#view=1,2,3,4,5,60'};
+  const all = {secure: true, webCodecs: true, webGl2: true, webAssembly: true, href: 'http://host:9080/#view=1,2,3,4,5,60'};
   assert.equal(whatIsMissing(all), null);
   const insecure = whatIsMissing({...all, secure: false, webCodecs: false});
   assert.equal(insecure?.link?.href, 'https://host:9080/#view=1,2,3,4,5,60', 'the view is kept');
   assert.match(whatIsMissing({...all, webCodecs: false})!.text, /WebCodecs.*use a current/);
   assert.match(whatIsMissing({...all, webGl2: false})!.text, /WebGL 2.*hardware acceleration/);
+  assert.match(whatIsMissing({...all, webAssembly: false})!.text, /WebAssembly.*allow it/);
 });
 
 test('a goodbye says whether to come again', () => {
@@ -51,7 +52,7 @@ test('classes of samples are counted over surfaces alone', () => {
 });
 
 test('a stick at rest stays at rest', () => {
-  assert.equal(Math.abs(axisOf(0.1)) + Math.abs(axisOf(-0.14)) + Math.abs(axisOf(undefined)), 0);
+  for (const value of [0.1, -0.14, NaN, undefined]) assert.equal(Math.abs(axisOf(value)), 0, String(value));
   assert.equal(axisOf(1), 1);
   assert.equal(axisOf(-1), -1);
 });

@@ -38,9 +38,26 @@ TEST(Steering, KeysAndSticksMoveTheSameWay) {
   EXPECT_TRUE(keys.hurry && pad.hurry);
 }
 
+TEST(Steering, AStepIsAsLongAsThePictureBeforeButNoLeapAfterARest) {
+  EXPECT_DOUBLE_EQ(step_seconds(20, false), 0.02);
+  EXPECT_DOUBLE_EQ(step_seconds(180, false), 0.18) << "five pictures a second walk as far as sixty";
+  EXPECT_LE(step_seconds(4000, false), 0.25);
+  EXPECT_EQ(step_seconds(-5, false), 0);
+  EXPECT_LT(step_seconds(4000, true), 0.02);
+}
+
+TEST(Steering, KeysLookUpAndDown) {
+  Steering up, down;
+  add(up, HeldKeys{.look_up = true});
+  add(down, HeldKeys{.look_down = true});
+  EXPECT_GT(up.pitch, 0) << "up is positive";
+  EXPECT_EQ(down.pitch, -up.pitch);
+}
+
 TEST(Steering, OppositeKeysCancel) {
   Steering s;
-  add(s, HeldKeys{.ahead = true, .back = true, .turn_left = true, .turn_right = true});
+  add(s,
+      HeldKeys{.ahead = true, .back = true, .turn_left = true, .turn_right = true, .look_up = true, .look_down = true});
   EXPECT_FALSE(s.any());
 }
 

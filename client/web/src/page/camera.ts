@@ -23,9 +23,12 @@ export function clamp(value: number, low: number, high: number): number {
   return Math.min(high, Math.max(low, value));
 }
 
-/** Any input gives a view that can be drawn: angles are wrapped and held, what is not finite becomes 0 (fovy 50 deg). */
+/** On each axis, metres: what lies beyond, a server does not take. */
+const kFarthest = 5e8;
+
+/** Any input gives a view that can be drawn: all is held within bounds, what is not finite becomes 0 (fovy 50 deg). */
 export function tidy(view: View): View {
-  const finite = (value: number): number => (Number.isFinite(value) ? value : 0);
+  const finite = (value: number): number => (Number.isFinite(value) ? clamp(value, -kFarthest, kFarthest) : 0);
   const yaw = finite(view.yaw);
   return {
     position: [finite(view.position[0]), finite(view.position[1]), finite(view.position[2])],

@@ -8,14 +8,15 @@ const kKeys: Record<string, Vec3> = {
   KeyE: [0, 1, 0], PageUp: [0, 1, 0], KeyQ: [0, -1, 0], PageDown: [0, -1, 0],
 };
 const kTurnKeys: Record<string, number> = {ArrowLeft: 1, ArrowRight: -1};
+const kLookKeys: Record<string, number> = {KeyR: 1, KeyF: -1};
 const kTurnSpeed = 1.2;        // radians a second, by key
 const kStickTurnSpeed = 2.2;   // radians a second, stick fully over
 const kDeadZone = 0.15;
 const kWheelStep = 100;        // CSS pixels of scrolling in one step
 
-/** A stick's axis without its centre's wobble, in [-1, 1]. */
+/** A stick's axis without its centre's wobble, in [-1, 1]. NaN is 0. */
 export function axisOf(value: number | undefined): number {
-  const v = value ?? 0;
+  const v = value !== undefined && Number.isFinite(value) ? value : 0;
   const beyond = Math.max(0, Math.abs(v) - kDeadZone) / (1 - kDeadZone);
   return Math.sign(v) * Math.min(1, beyond);
 }
@@ -54,6 +55,7 @@ export class Input {
     for (const code of this.held) {
       kKeys[code]?.forEach((v, i) => (wish[i]! += v));
       turn += (kTurnKeys[code] ?? 0) * kTurnSpeed * seconds;
+      tilt += (kLookKeys[code] ?? 0) * kTurnSpeed * seconds;
     }
     let hurry = this.held.has('ShiftLeft') || this.held.has('ShiftRight');
     const pads = navigator.getGamepads?.() ?? [];
@@ -76,7 +78,7 @@ export class Input {
 
   /** True if a gamepad has to be asked each frame: it has no events. */
   get polls(): boolean {
-    return (navigator.getGamepads?.() ?? []).some((pad) => pad !== null);
+    return (navigator.getGamepads?.() ?? []).some((pad) => pad?.mapping === 'standard');
   }
 
   private turn(yaw: number, pitch: number): void {
@@ -86,9 +88,8 @@ export class Input {
 
   private key(e: KeyboardEvent): void {
     if (e.ctrlKey || e.metaKey || e.altKey) return;
-    // Buttons and links keep their keys.
-    if (e.target instanceof HTMLElement && e.target.closest('button, a, input, select')) return;
-    if (!(e.code in kKeys) && !(e.code in kTurnKeys) && !e.code.startsWith('Shift')) return;
+    // A button that was pressed keeps Enter and Space; none of these means anything to it.
+    if (!(e.code in kKeys) && !(e.code in kTurnKeys) && !(e.code in kLookKeys) && !e.code.startsWith('Shift')) return;
     this.held.add(e.code);
     if (!e.code.startsWith('Shift')) {
       e.preventDefault();

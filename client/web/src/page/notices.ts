@@ -16,6 +16,7 @@ export class Notices {
 
   /** The reason why there is no picture, and the way out. */
   alert(sentence: Sentence): void {
+    this.quiet('');
     const line = document.createElement('p');
     line.textContent = sentence.text;
     this.alertBox.replaceChildren(line);
@@ -24,6 +25,14 @@ export class Notices {
       a.href = sentence.link.href;
       a.textContent = sentence.link.label;
       this.alertBox.append(a);
+    }
+    if (sentence.reload) {
+      // No link: one to this very address, with its #view, would load nothing.
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.textContent = 'Reload';
+      button.addEventListener('click', () => location.reload());
+      this.alertBox.append(button);
     }
     this.alertBox.hidden = false;
   }

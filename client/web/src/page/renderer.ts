@@ -60,6 +60,9 @@ export class Renderer {
     this.programs = new Programs(gl, this.linear);
     this.targets = new Targets(gl, this.linear);
     this.textures = new StreamTextures(gl, scene);
+    // A renderer that is made while a session goes on sees no first frame.
+    this.textures.begin(shape, 'shared');
+    if (shape.viewSize > 0) this.textures.begin(shape, 'view');
     this.emptyArray = gl.createVertexArray();
     for (const instance of scene.instances) {
       const list = this.instancesOf.get(instance.chart);

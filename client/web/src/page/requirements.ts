@@ -4,12 +4,15 @@ export interface Sentence {
   text: string;
   /** Where the way out is, if it is a place. */
   link?: {href: string; label: string};
+  /** The way out is to load the page anew. */
+  reload?: true;
 }
 
 export interface Surroundings {
   secure: boolean;
   webCodecs: boolean;
   webGl2: boolean;
+  webAssembly: boolean;
   /** The page's address. */
   href: string;
 }
@@ -37,6 +40,10 @@ export function whatIsMissing(here: Surroundings): Sentence | null {
   if (!here.webGl2) {
     return {text: 'This browser cannot draw the scene (it has no WebGL 2): please turn on hardware acceleration in its ' +
                   'settings, or use another browser.'};
+  }
+  if (!here.webAssembly) {
+    return {text: 'This browser cannot unpack the scene (it has no WebAssembly): please allow it in its settings, or use ' +
+                  'another browser.'};
   }
   return null;
 }

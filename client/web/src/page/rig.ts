@@ -114,7 +114,7 @@ export class Rig {
   }
 
   private shift(by: Vec3): void {
-    this.view = {...this.view, position: plus(this.view.position, by)};
+    this.view = tidy({...this.view, position: plus(this.view.position, by)});
   }
 }
 

@@ -35,7 +35,7 @@ async function start(): Promise<void> {
   const gl = canvas.getContext('webgl2', {alpha: false, antialias: false, depth: false, stencil: false,
     powerPreference: 'high-performance'});
   const missing = whatIsMissing({secure: window.isSecureContext, webCodecs: 'VideoDecoder' in window,
-    webGl2: gl !== null, href: location.href});
+    webGl2: gl !== null, webAssembly: typeof WebAssembly === 'object', href: location.href});
   if (missing !== null || gl === null) {
     if (missing !== null) notices.alert(missing);
     return;
@@ -45,6 +45,7 @@ async function start(): Promise<void> {
   const {width, height} = devicePixels();
   const pose: Pose | null = linked ? toPose(linked, width, height) : null;
   const worker = new Worker(new URL(WORKER_NAME, import.meta.url), {type: 'module', name: 'darm stream'});
+  worker.onerror = () => notices.alert({text: "The page's stream could not start: please reload it.", reload: true});
   // What comes before the rest of the page is there waits here.
   const early: FromWorker[] = [];
   worker.onmessage = (event: MessageEvent<FromWorker>) => early.push(event.data);

@@ -1,5 +1,5 @@
 // One visit: ties the stream, the renderer, the camera and the page's few buttons together.
-import type {Answer, FromWorker, LagStages, OutReason, ToWorker, Traffic} from '../shared/messages.js';
+import type {Answer, FromWorker, LagStages, OutReason, Pose, ToWorker, Traffic} from '../shared/messages.js';
 import type {Chunk, FrameUpdate, Planes, SceneShape, StreamShape} from '../shared/scene.js';
 import type {View} from './camera.js';
 import {forward, fromPose, right, toPose, up} from './camera.js';
@@ -17,9 +17,15 @@ import type {Residency} from './residency.js';
 import {ResidencyCounter} from './residency.js';
 import {Rig, minus, plus, scaled} from './rig.js';
 
+const kLostLine = 'Connection lost; the picture stays. Trying again…';
 const kStillAfterMs = 150;
 const kLinkAfterMs = 400;
+/** Seconds that a hand moves the view in one step: the first after a rest, and at most. */
+const kFirstStep = 0.016;
+const kLongestStep = 0.25;
 const kPanelEveryMs = 500;
+/** A graphics driver that was reset is back by then, or not at all. */
+const kRestoreMs = 15_000;
 
 /** For scripts and tests: `window.darm.status()`. */
 export interface Status {
@@ -63,6 +69,7 @@ export class Visit implements InputOwner {
   private counter: ResidencyCounter;
   private renderer: Renderer | null = null;
   private scene: SceneShape | null = null;
+  private start: Pose | null = null;  // where the server's scene is entered
   private shape: StreamShape = {size: 0, viewSize: 0};
   private shapeNew = false;
   private chunks: Chunk[] = [];
@@ -74,6 +81,7 @@ export class Visit implements InputOwner {
   private refined = false;
   private movedAt = -Infinity;
   private lastTick = 0;
+  private rested = true;
   private cameraAt = -Infinity;
   private cameraDirty = true;
   private cameraEveryMs = 50;
@@ -87,6 +95,7 @@ export class Visit implements InputOwner {
     finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, resolutionError: 0, lagMs: null, lagStages: null, residency: null,
     received: 0, cost: {drawMs: 0, decodeMs: 0, uploadMs: 0, level: 0}};
   private uploadMs = 0;
+  private restoreTimer = 0;
   private shownFrame = 0;
   private linkTimer = 0;
 
@@ -109,10 +118,12 @@ export class Visit implements InputOwner {
     window.addEventListener('resize', () => this.redraw());
     window.addEventListener('hashchange', () => this.followLink());
     window.addEventListener('pagehide', () => this.say({type: 'close'}));
+    window.addEventListener('pageshow', (e) => {
+      if (e.persisted) this.say({type: 'resume'});  // kept by the browser, and gone back to
+    });
     canvas.addEventListener('webglcontextlost', (e) => {
       e.preventDefault();
-      this.renderer = null;
-      this.notices.quiet('The graphics driver was reset; the picture comes back by itself.');
+      this.loseGraphics();
     });
     canvas.addEventListener('webglcontextrestored', () => this.restore());
     Object.assign(window, {darm: {status: (): Status => ({...this.status, view: this.rig.view, mode: this.rig.mode,
@@ -124,7 +135,7 @@ export class Visit implements InputOwner {
 
   moved(): void {
     this.movedAt = performance.now();
-    this.placedView = true;
+    if (this.status.joins > 0) this.placedView = true;  // whoever cannot wait begins at the start all the same
     this.cameraDirty = true;
     this.redraw();
   }
@@ -180,6 +191,7 @@ export class Visit implements InputOwner {
     this.shape = m.shape;
     this.chunksInView = m.chunksInView;
     this.cameraEveryMs = 1000 / Math.min(60, Math.max(5, 2 * m.updatesPerSecond));
+    this.start = m.start;
     if (!this.placedView) this.rig.view = fromPose(m.start);
     this.answer = null;
     this.cameraDirty = true;
@@ -189,35 +201,61 @@ export class Visit implements InputOwner {
   }
 
   private beginScene(scene: SceneShape): void {
+    const other = this.scene !== null && this.scene.name !== scene.name;
     this.scene = scene;
     this.chunks = [];
     this.coarse = null;
     document.title = scene.name ? `${scene.name} – DARM` : 'DARM';
     const {mode, pivot} = this.rig;
-    this.rig.setBounds({low: plus(scene.low, scene.origin), high: plus(scene.high, scene.origin)});
-    if (this.status.joins > 1) Object.assign(this.rig, {mode, pivot});
+    const bounds = {low: plus(scene.low, scene.origin), high: plus(scene.high, scene.origin)};
+    this.rig.setBounds(bounds);
+    if (other && this.start !== null) {
+      // Where the visitor stood is a place of the scene before.
+      this.rig.stop();
+      this.rig.view = fromPose(this.start);
+      this.rig.setBounds(bounds);
+      this.cameraDirty = true;
+    } else if (this.status.joins > 1) {
+      Object.assign(this.rig, {mode, pivot});
+    }
     this.showMode();
     this.makeRenderer(scene);
   }
 
   private makeRenderer(scene: SceneShape): void {
+    if (this.gl.isContextLost()) return;  // restore() does it
     try {
       this.renderer = new Renderer(this.gl, scene, this.shape);
       for (const chunk of this.chunks) this.renderer.addChunk(chunk);
       if (this.coarse) this.renderer.putCoarse(this.coarse);
     } catch (error) {
-      const why = error instanceof Error ? error.message : String(error);
-      this.notices.alert({text: `The scene cannot be drawn here: ${why}.`});
+      this.failToDraw(error);
     }
     this.redraw();
   }
 
+  private failToDraw(error: unknown): void {
+    this.renderer = null;
+    const why = error instanceof Error ? error.message : String(error);
+    this.notices.alert({text: `The scene cannot be drawn here (${why}): please try another browser or device.`});
+  }
+
+  private loseGraphics(): void {
+    this.renderer = null;
+    this.notices.quiet('The graphics driver was reset; the picture comes back by itself.');
+    this.restoreTimer = window.setTimeout(
+      () => this.notices.alert({text: 'The graphics driver does not come back: please reload the page.', reload: true}),
+      kRestoreMs);
+  }
+
   private restore(): void {
+    clearTimeout(this.restoreTimer);
     this.timer.forget();
     this.counter = new ResidencyCounter(this.gl);
     if (this.scene !== null) this.makeRenderer(this.scene);
     this.say({type: 'key frames'});
-    this.notices.quiet('');
+    this.notices.calm();
+    this.notices.quiet(this.status.joined ? '' : kLostLine);
   }
 
   // Frames of the private layer say nothing of it: -1.
@@ -249,19 +287,19 @@ export class Visit implements InputOwner {
   private out(reason: OutReason, text: string, retryMs: number): void {
     this.status.joined = false;
     if (reason === 'lost') {
-      this.notices.quiet(this.renderer === null ? `${text} Trying again…`
-                                                : 'Connection lost; the picture stays. Trying again…');
+      this.notices.calm();
+      this.notices.quiet(this.renderer === null ? `${text} Trying again…` : kLostLine);
     } else if (reason === 'full') {
       const again = ` It is tried again in ${Math.round(retryMs / 1000)} s: please wait, or come back later.`;
       if (this.renderer === null) this.notices.alert({text: text + again});
       else this.notices.quiet(text + again);
     } else if (reason === 'version') {
-      this.notices.alert({text: `${text} Please reload the page.`, link: {href: location.href, label: 'Reload'}});
+      this.notices.alert({text: `${text} Please reload the page.`, reload: true});
     } else if (reason === 'decoder') {
       const out = 'please use another browser';
       this.notices.alert({text: `This browser's decoder does not take the picture (${text}): ${out}.`});
     } else {
-      this.notices.alert({text: `${text} Please reload the page.`, link: {href: location.href, label: 'Reload'}});
+      this.notices.alert({text: `${text} Please reload the page.`, reload: true});
     }
   }
 
@@ -279,9 +317,10 @@ export class Visit implements InputOwner {
 
   private tick(now: number): void {
     this.loop = 0;
-    const seconds = Math.min(0.1, Math.max(0, (now - this.lastTick) / 1000));
+    // After a rest the time since the last tick says nothing; a slow device walks no slower than a quick one.
+    const seconds = this.rested ? kFirstStep : Math.min(kLongestStep, Math.max(0, (now - this.lastTick) / 1000));
     this.lastTick = now;
-    if (this.input.advance(seconds > 0.099 ? 0.016 : seconds)) this.moved();
+    if (this.input.advance(seconds)) this.moved();
     const moving = performance.now() - this.movedAt < kStillAfterMs;
     const done = this.timer.poll();
     if (done !== null) {
@@ -294,6 +333,7 @@ export class Visit implements InputOwner {
     this.updatePanel(now, moving);
     if (this.dirty || !this.refined || moving || this.timer.busy || this.cameraDirty || this.counter.busy ||
         this.input.polls || this.rig.moving) this.wake();
+    this.rested = this.loop === 0;
   }
 
   private drawIfDue(moving: boolean): void {
@@ -307,7 +347,11 @@ export class Visit implements InputOwner {
     // A still view that cannot be refined yet keeps its finest picture rather than fall back to a coarser one.
     if (!moving && !finest && this.status.finest && this.guard.level > 0) return;
     this.timer.start(quality);
-    renderer.draw(this.rig.view, width, height, quality);
+    try {
+      renderer.draw(this.rig.view, width, height, quality);
+    } catch (error) {
+      return this.failToDraw(error);
+    }
     this.timer.end();
     this.dirty = false;
     this.refined = quality === this.guard.finest;
@@ -429,11 +473,12 @@ export class Visit implements InputOwner {
     if (view === null) return;
     this.rig.stop();
     this.rig.view = view;
+    this.placedView = true;
     this.moved();
   }
 
   private async share(): Promise<void> {
-    this.writeLink();
+    if (this.status.joins > 0) this.writeLink();
     try {
       await navigator.clipboard.writeText(location.href);
       this.notices.quiet('The link to this view is copied.', 3);

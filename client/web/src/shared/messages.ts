@@ -16,7 +16,8 @@ export type ToWorker =
   | {type: 'shown'; frame: number; drawUs: number}
   | {type: 'key frames'}
   | {type: 'recycle'; buffer: ArrayBuffer}
-  | {type: 'close'};
+  | {type: 'close'}
+  | {type: 'resume'};
 
 /** Why there is no stream. `lost`: it is tried again by itself, as is `full`; the others are final. */
 export type OutReason = 'lost' | 'full' | 'version' | 'refused' | 'fault' | 'decoder';

@@ -5,7 +5,7 @@ import {CameraUpdateSchema, FeedbackSchema, HelloSchema, PoseSchema} from '../ge
 import type {CoarseTexture, SceneManifest, StreamFrame, Welcome} from '../gen/darm_pb.js';
 import {kMaxPhysTex, kMaxViewPhysTex, kProtocolVersion} from '../shared/limits.js';
 import type {FromWorker, OutReason, Pose, Traffic} from '../shared/messages.js';
-import type {SceneShape, StreamShape} from '../shared/scene.js';
+import type {Planes, SceneShape, StreamShape} from '../shared/scene.js';
 import {BufferPool} from './buffer_pool.js';
 import {answerOf} from './lag.js';
 import {ChunkReader, readManifest, Refused} from './scene_reader.js';
@@ -114,13 +114,17 @@ export class Session implements SocketOwner {
     this.socket.close();
   }
 
+  resume(): void {
+    this.socket.resume();
+  }
+
   private tellTraffic(): void {
     this.post({type: 'traffic', traffic: {...this.traffic}});
   }
 
   private stop(error: unknown): void {
     if (error instanceof NoDecoder) {
-      this.socket.close();
+      this.socket.stop();
       this.post({type: 'out', reason: 'decoder', text: error.message, retryMs: -1});
     } else {
       this.socket.fail(error instanceof Refused ? `The server contradicts itself: ${error.message}.`
@@ -191,12 +195,23 @@ export class Session implements SocketOwner {
     if (coarse.width !== last.width || coarse.height !== last.height) {
       throw new Refused('CoarseTex: its size differs from the manifest');
     }
-    const picture = await this.coarseDecoder.decode(coarse.h264, true, coarse.version);
+    const picture = await this.decodeCoarse(coarse);
     if (picture.width !== last.width || picture.height !== last.height) {
       throw new Refused('CoarseTex: its picture has another size');
     }
     this.tellTraffic();
     this.post({type: 'coarse', picture}, [picture.buffer]);
+  }
+
+  // A still needs no other picture: what fails once (a decoder that was taken away, or is changed) is tried again.
+  private async decodeCoarse({h264, version}: CoarseTexture): Promise<Planes> {
+    try {
+      return await this.coarseDecoder.decode(h264, true, version);
+    } catch (error) {
+      if (error instanceof NoDecoder) throw error;
+      this.coarseDecoder.reset();
+      return this.coarseDecoder.decode(h264, true, version);
+    }
   }
 
   private async takeFrame(player: StreamPlayer | null, frame: StreamFrame, shared: boolean,

@@ -29,7 +29,7 @@ export function retryDelay(n: number, random: number): number {
   return Math.min(kLongestRetryMs, kFirstRetryMs * 2 ** Math.min(n, 10)) * (0.9 + 0.2 * random);
 }
 
-/** What a goodbye means for the person at the screen. */
+/** What a goodbye means for the person at the screen. `lost` is tried again as after any loss, later each time. */
 export function meaningOf(reason: Goodbye_Reason, text: string): {reason: OutReason; text: string; retryMs: number} {
   switch (reason) {
     case Goodbye_Reason.SERVER_FULL:
@@ -52,18 +52,18 @@ export class StreamSocket {
   private pinger = 0;
   private heard = 0;
   private watchedAt = 0;
-  private stopped = false;
+  private stopped = false;  // for good
+  private away = false;     // until resume()
 
   constructor(private readonly url: string, private readonly owner: SocketOwner) {
     self.addEventListener('online', () => this.retryNow());
   }
 
   open(): void {
-    this.stopped = false;
     const socket = new WebSocket(this.url, kSubprotocol);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
-    this.heard = performance.now();
+    this.heard = this.watchedAt = performance.now();
     let opened = false;
     socket.onopen = () => {
       opened = true;
@@ -74,6 +74,7 @@ export class StreamSocket {
     socket.onclose = () => {
       if (this.socket !== socket) return;
       this.socket = null;
+      clearInterval(this.pinger);
       if (opened) this.lost('The connection is gone.');
       else void this.explainRefusal();
     };
@@ -96,14 +97,30 @@ export class StreamSocket {
     this.end('fault', text, -1);
   }
 
+  /** The page is put away, perhaps for a while only. */
   close(): void {
     this.send({case: 'goodbye', value: create(GoodbyeSchema, {reason: Goodbye_Reason.CLIENT_LEAVES})});
     this.drop();
+    clearTimeout(this.timer);
+    this.timer = 0;
+    this.away = true;
+  }
+
+  /** It is back. */
+  resume(): void {
+    if (!this.away || this.stopped) return;
+    this.away = false;
+    this.open();
+  }
+
+  /** There is no way on with this server. */
+  stop(): void {
+    this.close();
     this.stopped = true;
   }
 
   retryNow(): void {
-    if (this.socket !== null || this.stopped || this.timer === 0) return;
+    if (this.socket !== null || this.timer === 0) return;
     clearTimeout(this.timer);
     this.timer = 0;
     this.open();
@@ -123,7 +140,7 @@ export class StreamSocket {
     if (body.case === 'pong') return;
     if (body.case === 'goodbye') {
       const meaning = meaningOf(body.value.reason, body.value.text.slice(0, 512));
-      return this.end(meaning.reason, meaning.text, meaning.retryMs);
+      return meaning.reason === 'lost' ? this.lost(meaning.text) : this.end(meaning.reason, meaning.text, meaning.retryMs);
     }
     this.owner.message(body, data.byteLength);
   }
@@ -144,25 +161,37 @@ export class StreamSocket {
     this.end('lost', text, retryDelay(this.tries++, Math.random()));
   }
 
+  // Somebody else has decided meanwhile how it goes on.
+  private get busy(): boolean {
+    return this.away || this.stopped || this.socket !== null || this.timer !== 0;
+  }
+
   // A browser does not say why an upgrade was refused; /healthz does.
   private async explainRefusal(): Promise<void> {
+    let text = 'The server does not answer.';
     const health = new URL('/healthz', this.url.replace(/^ws/, 'http'));
     try {
       const reply = await fetch(health, {signal: AbortSignal.timeout(2000), cache: 'no-store'});
       const told = await reply.json() as {protocol?: number};
+      if (this.busy) return;
       if (typeof told.protocol === 'number' && told.protocol !== kProtocolVersion) {
         return this.end('version', `The server speaks version ${told.protocol}, this page ${kProtocolVersion}.`, -1);
+      }
+      if (reply.ok && typeof told.protocol === 'number') {
+        text = 'The server is there, but its stream does not come through: what lies between must let WebSockets pass ' +
+               'and keep the name of the host.';
       }
     } catch {
       // no server at all: it is tried again
     }
-    this.lost('The server does not answer.');
+    if (!this.busy) this.lost(text);
   }
 
   private end(reason: OutReason, text: string, retryMs: number): void {
     this.drop();
     if (retryMs < 0) this.stopped = true;
-    if (!this.stopped && this.timer === 0) {
+    if (!this.stopped) {
+      clearTimeout(this.timer);
       this.timer = self.setTimeout(() => {
         this.timer = 0;
         this.open();

@@ -23,6 +23,12 @@ export function splitChroma(interleaved: Uint8Array, cb: Uint8Array, cr: Uint8Ar
   }
 }
 
+/**
+ * A picture that is not out by then is held back by the decoder, which waits for more: none would ever come. Long, because
+ * fourteen pages on two cores take seconds too. Stills are flushed, and cannot be held back.
+ */
+const kHeldBackMs = 10_000;
+
 type Waiting = {timestamp: number; resolve: (frame: VideoFrame) => void; reject: (error: Error) => void};
 
 /**
@@ -34,6 +40,7 @@ export class PictureDecoder {
   private waiting: Waiting | null = null;
   private configured = '';
   private preference: HardwareAcceleration = 'no-preference';
+  private heldBack = 0;  // in a row
 
   /** `take` gives a buffer of at least so many bytes. `still`: each picture is a stream of its own. */
   constructor(private readonly take: (bytes: number) => ArrayBuffer, private readonly still = false) {}
@@ -42,11 +49,14 @@ export class PictureDecoder {
     if (key) this.configure(h264);
     const decoder = this.decoder;
     if (decoder === null) throw new Error('no key frame yet');
+    let late: ReturnType<typeof setTimeout> | undefined;
     const frame = await new Promise<VideoFrame>((resolve, reject) => {
       this.waiting = {timestamp, resolve, reject};
+      if (!this.still) late = setTimeout(() => this.giveUpWaiting(), kHeldBackMs);
       decoder.decode(new EncodedVideoChunk({type: key ? 'key' : 'delta', timestamp, data: h264}));
       if (this.still) decoder.flush().catch(reject);
-    });
+    }).finally(() => clearTimeout(late));
+    this.heldBack = 0;
     try {
       return await this.planesOf(frame);
     } finally {
@@ -61,6 +71,12 @@ export class PictureDecoder {
     if (decoder !== null && decoder.state !== 'closed') decoder.close();
     this.waiting?.reject(new Error('the decoder was reset'));
     this.waiting = null;
+  }
+
+  // Once may be a machine that slept; a decoder that does it again is a kind that does.
+  private giveUpWaiting(): void {
+    if (++this.heldBack > 1) this.preference = 'prefer-software';
+    this.reset();
   }
 
   private configure(h264: Uint8Array): void {

@@ -23,6 +23,8 @@ self.onmessage = async (event: MessageEvent<ToWorker>) => {
     session.askForKeys();
   } else if (m.type === 'recycle') {
     session.recycle(m.buffer);
+  } else if (m.type === 'resume') {
+    session.resume();
   } else {
     session.close();
   }
