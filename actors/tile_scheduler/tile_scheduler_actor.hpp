@@ -226,6 +226,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void choose(Stream& stream);
   void set_targets(Stream& stream) const;
   void grant(Stream& stream);
+  [[nodiscard]] static MemberLook look_of(const Session& session);
   void note_chosen(Stream& stream, std::chrono::microseconds started);
   void force_key(Stream& stream);
   void admit(Stream& stream, Microseconds now);

@@ -146,17 +146,26 @@ void TileSchedulerActor::settle(Stream& stream) {
 }
 
 // What a session sees counts among what all of its stream see.
-void TileSchedulerActor::note_seen(Session& session) {
+MemberLook TileSchedulerActor::look_of(const Session& session) {
   const bool rests = session.set.passes() > 0;
-  session.stream->together.add(session.set.current(), rests ? SharedSet::kRests : 1.0f);
+  // While a first look from a new place is under way the set is still of the place before.
+  const bool from_there = session.posed && !(session.job && session.job->starts_pose);
+  return {from_there ? &*session.posed : nullptr, &session.set.current(), rests ? SharedSet::kRests : 1.0f};
+}
+
+void TileSchedulerActor::note_seen(Session& session) {
+  const auto look = look_of(session);
+  session.stream->together.add(*look.samples, look.looks);
 }
 
 // Forgets what nobody has seen for a while.
 void TileSchedulerActor::gather(Stream& stream) {
   const auto began = executor().thread_time();
   stream.together.renew(now_us());
-  for (auto* member : stream.members)
-    if (member->set.current().samples() > 0) note_seen(*member);
+  std::vector<MemberLook> looks;
+  for (const auto* member : stream.members)
+    if (member->set.current().samples() > 0) looks.push_back(look_of(*member));
+  for (const auto& look : join_same_views(looks)) stream.together.add(*look.samples, look.looks);
   const auto took = (executor().thread_time() - began).count();
   stream.together.renewed(took, now_us());
   metrics_.observe("darm_stream_gather_seconds", double(took) * 1e-6);
