@@ -56,6 +56,10 @@ struct SchedulerOptions {
   /// When a still view that does not fit its slots is weighed anew by what its pictures have come to show; then after
   /// twice that, and so on: slots change hands a few times at first, and then no more.
   Microseconds reweigh_interval = 1'000'000;
+  /// How long none of a stream's members has seen something else, come or gone, until tiles change hands less readily,
+  /// and until they hardly do: by then measured losses have met pictures of many samples.
+  Microseconds rests_after = 1'000'000;
+  Microseconds rested_after = 20'000'000;
   /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.
   Microseconds first_frame_wait = 300'000;
   /// Least time between key frames that sessions of a stream ask for: each writes every slot and the whole page table.
@@ -172,6 +176,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool unchosen = false;          // there is more to see
     bool ungranted = false;         // pictures have come since then
     bool pictures_since = false;    // and since slots were chosen
+    Microseconds changed_at = 0;    // when one of its members last saw something else, came or went
     int reweighed = 0;              // times that they were chosen for nothing but that, since somebody saw more
     Microseconds asked_at = 0;      // for the first pictures
     std::optional<Microseconds> key_at;
@@ -221,12 +226,13 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void settle(Stream& stream);
   void group(Session& session);
   void gather(Stream& stream);
+  [[nodiscard]] static MemberLook look_of(const Session& session);
   void note_seen(Session& session);
+  [[nodiscard]] Moves moves_of(const Stream& stream) const;
   void choose_if_due(Stream& stream);
   void choose(Stream& stream);
   void set_targets(Stream& stream) const;
   void grant(Stream& stream);
-  [[nodiscard]] static MemberLook look_of(const Session& session);
   void note_chosen(Stream& stream, std::chrono::microseconds started);
   void force_key(Stream& stream);
   void admit(Stream& stream, Microseconds now);

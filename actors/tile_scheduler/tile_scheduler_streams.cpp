@@ -47,6 +47,7 @@ void TileSchedulerActor::enter(Session& session, StreamId id) {
   }
   stream->members.insert(std::ranges::lower_bound(stream->members, session.id, {}, &Session::id), &session);
   session.stream = stream.get();
+  stream->changed_at = now_us();
   session.awaits_key = session.unchosen = true;
   if (stream->members.size() == 2) gather(*stream);
   if (stream->members.size() > 2) note_seen(session);
@@ -61,6 +62,7 @@ void TileSchedulerActor::leave(Session& session) {
   if (auto open = stream.state.forget_session(session.id); open && !session.answer) session.answer = open;
   std::erase(stream.members, &session);
   session.unchosen = false;
+  stream.changed_at = now_us();
   stream.together.note_change();
   if (!stream.shared()) stream.together.clear();
   peers_->set_receivers(stream.id, groups_.members(stream.id));
@@ -175,6 +177,12 @@ void TileSchedulerActor::choose_if_due(Stream& stream) {
   if (stream.unchosen && now_us() >= stream.choose_after) choose(stream);
 }
 
+Moves TileSchedulerActor::moves_of(const Stream& stream) const {
+  const auto rested = now_us() - stream.changed_at;
+  if (rested < options_.rests_after) return Moves::kFreely;
+  return rested < options_.rested_after ? Moves::kFew : Moves::kHardlyAny;
+}
+
 // Chooses slots for what the members see together, and what is shaded for them.
 void TileSchedulerActor::choose(Stream& stream) {
   const auto started = executor().thread_time();
@@ -182,7 +190,8 @@ void TileSchedulerActor::choose(Stream& stream) {
   const auto rests = [](const Session* member) { return member->set.passes() >= kTapPasses; };
   const auto seen = stream.shared() ? stream.together.seen(std::ranges::all_of(stream.members, rests))
                                     : stream.members.front()->set.seen();
-  stream.demand = demand_of(seen, *layout_, stream.state.table(), images(), coarse_.get(), options_.allocation);
+  stream.demand =
+      demand_of(seen, *layout_, stream.state.table(), images(), coarse_.get(), options_.allocation, moves_of(stream));
   stream.known.clear();
   for (const auto& item : stream.demand.chains) stream.known.insert(item.chain);
   set_targets(stream);
