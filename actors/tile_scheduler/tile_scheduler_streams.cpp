@@ -178,8 +178,8 @@ void TileSchedulerActor::choose_if_due(Stream& stream) {
 }
 
 Moves TileSchedulerActor::moves_of(const Stream& stream) const {
-  const auto rested = now_us() - stream.changed_at;
-  if (rested < options_.rests_after) return Moves::kFreely;
+  if (now_us() - stream.changed_at < options_.rests_after) return Moves::kFreely;
+  const auto rested = now_us() - std::max(stream.changed_at, stream.unlit_at);
   return rested < options_.rested_after ? Moves::kFew : Moves::kHardlyAny;
 }
 
@@ -199,6 +199,7 @@ void TileSchedulerActor::choose(Stream& stream) {
   for (auto* member : stream.members) member->unchosen = false;
   stream.unchosen = stream.ungranted = stream.pictures_since = false;
   stream.weighed_at = now_us();
+  if (stream.demand.lit < options_.lit) stream.unlit_at = stream.weighed_at;
   work_changed_ = true;
   metrics_.observe("darm_view_tiles", double(stream.demand.target.tiles.size()));
   note_chosen(stream, started);
