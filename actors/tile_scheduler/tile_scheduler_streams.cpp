@@ -47,7 +47,7 @@ void TileSchedulerActor::enter(Session& session, StreamId id) {
   }
   stream->members.insert(std::ranges::lower_bound(stream->members, session.id, {}, &Session::id), &session);
   session.stream = stream.get();
-  stream->changed_at = now_us();
+  if (known_share(session.set.current(), stream->known) < options_.known) stream->changed_at = now_us();
   session.awaits_key = session.unchosen = true;
   if (stream->members.size() == 2) gather(*stream);
   if (stream->members.size() > 2) note_seen(session);
@@ -62,7 +62,6 @@ void TileSchedulerActor::leave(Session& session) {
   if (auto open = stream.state.forget_session(session.id); open && !session.answer) session.answer = open;
   std::erase(stream.members, &session);
   session.unchosen = false;
-  stream.changed_at = now_us();
   stream.together.note_change();
   if (!stream.shared()) stream.together.clear();
   peers_->set_receivers(stream.id, groups_.members(stream.id));
