@@ -201,7 +201,8 @@ TEST(SlotChurn, EndsWithinTwentySecondsOfRestWhateverTheNoise) {
       }
 }
 
-// Choosing anew at each time left 1.2 to 3.4 times as much lost as the best choice, after moving 6 times as many tiles.
+// Choosing anew at each time left 1.2 to 3.4 times as much lost as the best choice, after moving several times as many
+// tiles.
 TEST(SlotChurn, WhatIsHeldThenLosesLittleMoreThanTheBestChoice) {
   for (const float noise : {5.0f, 20.0f}) {
     double lost = 0;
