@@ -42,6 +42,7 @@ session::SessionPolicy session_policy(const config::Config& config, const World&
   policy.handshake_timeout = static_cast<Microseconds>(config.session.handshake_timeout_s * 1e6);
   policy.idle_timeout = static_cast<Microseconds>(config.session.idle_timeout_s * 1e6);
   policy.send.media_bytes = config.session.send_queue_bytes;
+  policy.memory = std::make_shared<session::SessionMemory>(config.session.max_memory_bytes);
   policy.send.grace = static_cast<Microseconds>(config.session.send_queue_seconds * 1e6);
   return policy;
 }
@@ -145,6 +146,7 @@ Result<Addresses> Daemon::Parts::listen() {
   surroundings->scheduler = pipeline.scheduler;
   surroundings->coarse = pipeline.coarse;
   surroundings->sessions = sessions;
+  surroundings->addresses = std::make_shared<session::AddressPlaces>(config.session.max_sessions_per_address);
   surroundings->metrics = &metrics;
   surroundings->log = [](SessionId id, const std::string& text) {
     spdlog::info("session {}: {}", static_cast<std::uint64_t>(id), text);

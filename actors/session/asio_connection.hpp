@@ -5,6 +5,7 @@
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/ssl/stream.hpp>
 #include <memory>
+#include <string>
 
 #include "actors/session/connection.hpp"
 
@@ -23,5 +24,10 @@ using TlsSocket = boost::asio::ssl::stream<boost::asio::ip::tcp::socket>;
 /// What both listeners ask of a socket: no delay, and a send buffer so small that what cannot be sent waits in our
 /// queue, where it can be dropped.
 void set_stream_options(boost::asio::ip::tcp::socket& socket);
+
+/// Who is at the other end, for what one address may have: an IPv4 address, or the /64 of an IPv6 one, all of which
+/// whoever has one of them has. Empty: the connection is gone.
+[[nodiscard]] std::string peer_of(const boost::asio::ip::tcp::socket& socket);
+[[nodiscard]] std::string peer_of(const boost::asio::ip::address& address);
 
 }  // namespace darm::session

@@ -1,8 +1,12 @@
 #include "actors/session/pending_sockets.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace darm::session {
+namespace {
+constexpr std::size_t kMostPerAddress = 1u << 20;
+}  // namespace
 
 struct PendingSockets::State {
   std::mutex mutex;
@@ -12,7 +16,12 @@ struct PendingSockets::State {
   bool closed = false;
 };
 
-PendingSockets::PendingSockets(std::size_t most) : state_(std::make_shared<State>()) { state_->most = most; }
+// With half of the places, one address cannot keep the others out.
+PendingSockets::PendingSockets(std::size_t most)
+    : state_(std::make_shared<State>()),
+      addresses_(static_cast<unsigned>(std::clamp<std::size_t>(most / 2, 1, kMostPerAddress))) {
+  state_->most = most;
+}
 
 PendingSockets::Place::~Place() {
   if (!state_) return;  // moved from
@@ -20,12 +29,14 @@ PendingSockets::Place::~Place() {
   state_->closers.erase(id_);
 }
 
-std::optional<PendingSockets::Place> PendingSockets::enter(std::function<void()> close) {
+std::optional<PendingSockets::Place> PendingSockets::enter(std::function<void()> close, const std::string& address) {
+  auto among_its_own = addresses_.enter(address);
+  if (!among_its_own) return std::nullopt;
   const std::lock_guard lock(state_->mutex);
   if (state_->closed || state_->closers.size() >= state_->most) return std::nullopt;
   const auto id = state_->next++;
   state_->closers.emplace(id, std::move(close));
-  return std::make_optional<Place>(state_, id);
+  return std::make_optional<Place>(state_, id, std::move(*among_its_own));
 }
 
 void PendingSockets::close_all() {

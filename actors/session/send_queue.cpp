@@ -39,7 +39,7 @@ void SendQueue::push_coarse(Packet packet) {
 }
 
 bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer,
-                             Microseconds now) {
+                             Microseconds now, bool room) {
   const auto layer = frame->layer;
   auto& mine = track(layer);
   const auto oldest = std::find_if(items_.begin(), items_.end(),
@@ -47,7 +47,8 @@ bool SendQueue::push_picture(const std::shared_ptr<const EncodedFrame>& frame, c
   const bool late = oldest != items_.end() && waited(*oldest, now) > limits_.media_age;
   // A single picture may be of any size; only a queue of them is bounded.
   const bool full = mine.waiting > 0 && mine.waiting_bytes + size_of(*frame) > limits_.media_bytes;
-  if (late || full) drop_pictures(layer, late ? Drop::kOld : Drop::kFull);
+  const bool crowded = mine.waiting > 0 && !room;
+  if (late || full || crowded) drop_pictures(layer, late ? Drop::kOld : full ? Drop::kFull : Drop::kMemory);
   // A key frame makes what waits before it useless, and stands for it.
   if (frame->key && mine.waiting > 0) drop_pictures(layer, Drop::kReplaced);
   if (!frame->key && frame->stream != mine.stream && !mine.refused) {

@@ -34,8 +34,9 @@ enum class Drop : std::uint8_t {
   kLoading,    ///< the scene still went out
   kKeyNeeded,  ///< it builds on one that was not sent
   kElsewhere,  ///< of another stream, whose key frame was still to come
+  kMemory,     ///< all sessions together hold as much as they may
 };
-inline constexpr std::array kDropNames{"old", "full", "replaced", "loading", "key_needed", "elsewhere"};
+inline constexpr std::array kDropNames{"old", "full", "replaced", "loading", "key_needed", "elsewhere", "memory"};
 using DropCounts = std::array<std::size_t, kDropNames.size()>;
 
 /// First in, first out, but: control messages and coarse textures overtake bulk, and the background goes when nothing
@@ -60,8 +61,9 @@ class SendQueue {
   void push_manifest(Packet packet);
   /// Replaces a coarse texture that still waits. Overtakes bulk, so that what comes of it can be drawn lit.
   void push_coarse(Packet packet);
-  /// False: dropped (and with it whatever pictures waited).
-  bool push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer, Microseconds now);
+  /// False: dropped (and with it whatever pictures waited). `room`: there is memory for more than one to wait.
+  bool push_picture(const std::shared_ptr<const EncodedFrame>& frame, const ViewAnswer& answer, Microseconds now,
+                    bool room = true);
   /// An answer without a picture. Kept back for the next picture if the client is waiting for a key frame.
   void push_no_change(const NoChange& event);
 
@@ -87,6 +89,8 @@ class SendQueue {
   [[nodiscard]] bool loading() const { return bulk_waiting_ > 0; }
   /// Of pictures that wait.
   [[nodiscard]] std::size_t media_bytes() const { return tracks_[0].waiting_bytes + tracks_[1].waiting_bytes; }
+  /// Of all that waits, but for what was made for everybody (the scene).
+  [[nodiscard]] std::size_t bytes() const { return media_bytes() + control_waiting_bytes_; }
   /// Since it was made, by reason.
   [[nodiscard]] const DropCounts& drops() const { return drops_; }
   [[nodiscard]] bool any_dropped() const {

@@ -33,8 +33,13 @@ void tell_closed(runtime::Executor& executor, const runtime::Ref<tile_scheduler:
 }  // namespace
 
 SessionActor::SessionActor(runtime::Context<Inbox> context, SessionId id,
-                           std::shared_ptr<SessionSurroundings> surroundings, std::shared_ptr<Connection> connection)
-    : Actor(std::move(context)), id_(id), around_(std::move(surroundings)), connection_(std::move(connection)) {
+                           std::shared_ptr<SessionSurroundings> surroundings, std::shared_ptr<Connection> connection,
+                           std::shared_ptr<AddressPlaces::Place> place)
+    : Actor(std::move(context)),
+      id_(id),
+      around_(std::move(surroundings)),
+      connection_(std::move(connection)),
+      place_(std::move(place)) {
   ++*around_->live;
 }
 
@@ -83,6 +88,7 @@ void SessionActor::act(Actions&& actions) {
 
 void SessionActor::pump() {
   if (finished_) return;
+  protocol_->note_memory();
   if (auto packets = protocol_->next_packets(now_us()); !packets.empty()) {
     connection_->write(std::move(packets));
   } else if (protocol_->finished(now_us())) {
@@ -134,6 +140,7 @@ void SessionActor::on(DatagramReceived&& event) {
 void SessionActor::on(Tick&&) {
   if (finished_) return;
   act(protocol_->on_tick(now_us()));
+  around_->metrics->set("darm_session_memory_bytes", double(around_->policy.memory->held()));
   if (finished_) return;
   if (protocol_->finished(now_us())) return finish(protocol_->end());
   tick_later();

@@ -63,6 +63,7 @@ SessionProtocol::SessionProtocol(SessionId id, const SessionPolicy& policy, std:
       bodies_(std::move(bodies)),
       reader_(proto::kMaxClientEnvelope),
       queue_(policy.send),
+      memory_(policy.memory),
       started_(now),
       heard_(now) {}
 
@@ -143,7 +144,7 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
                      ", the client asked for " + std::to_string(hello.version()) + ".",
                  now);
   }
-  const auto format = negotiate(hello);
+  auto format = negotiate(hello);
   if (!format) {
     return close(wire::Goodbye::FORMAT_REFUSED,
                  hello.lossless() && !policy_.allow_lossless
@@ -159,6 +160,13 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
       fault("bad_pose", now, actions);
     }
   }
+  // The shared light needs no memory of its own; what depends on the eye does.
+  if (format->view_phystex > 0 && !memory_.has_room(private_layer_bytes(format->view_phystex))) {
+    format->view_phystex = 0;
+    actions.push_back(Noted{"no_memory_for_layer"});
+  }
+  layer_bytes_ = private_layer_bytes(format->view_phystex);
+  note_memory();
   state_ = State::kOpen;
   const float target = target_error(hello);
   if (hello.known_scene() == scene_->tag()) {
@@ -272,7 +280,8 @@ Actions SessionProtocol::on_datagram(const wire::DatagramBody& body, Microsecond
 Actions SessionProtocol::on_frame(const FrameEncoded& event, Microseconds now) {
   Actions actions;
   if (state_ != State::kOpen || !event.frame) return actions;
-  queue_.push_picture(event.frame, event.answer, now);
+  note_memory();
+  queue_.push_picture(event.frame, event.answer, now, memory_.has_room(event.frame->h264.size()));
   ask_for_keys(now, actions);
   tell_link(now, actions);
   tell_drops(actions);
@@ -288,6 +297,8 @@ void SessionProtocol::on_coarse(const CoarseUpdated& event) {
   coarse_version_ = event.coarse->version;
   queue_.push_coarse(packet_of(coarse_message(*event.coarse)));
 }
+
+void SessionProtocol::note_memory() { memory_.set(queue_.bytes() + layer_bytes_); }
 
 void SessionProtocol::ask_for_keys(Microseconds now, Actions& actions) {
   if (state_ != State::kOpen || pace_.full(0, now)) return;  // it would only wait

@@ -14,6 +14,7 @@
 #include "actors/session/geometry_stream.hpp"
 #include "actors/session/link_pace.hpp"
 #include "actors/session/send_queue.hpp"
+#include "actors/session/session_memory.hpp"
 #include "actors/session/session_messages.hpp"
 #include "actors/tile_scheduler/tile_scheduler_messages.hpp"
 #include "proto/darm.pb.h"
@@ -38,6 +39,8 @@ struct SessionPolicy {
   Microseconds goodbye_timeout = 2'000'000;  ///< for the last message to leave
   unsigned max_protocol_errors = 16;
   SendLimits send;
+  /// What sessions hold together. Without room a client gets no private layer, and pictures do not wait for it.
+  std::shared_ptr<SessionMemory> memory = std::make_shared<SessionMemory>();
 };
 
 /// Something worth a number: `what` is from a small fixed set, for metrics.
@@ -72,6 +75,8 @@ class SessionProtocol {
   [[nodiscard]] Actions on_tick(Microseconds now);
   void on_no_change(const NoChange& event);
   void on_coarse(const CoarseUpdated& event);
+  /// Says what it holds now to the policy's memory.
+  void note_memory();
 
   /// Says goodbye: what waits is dropped, the goodbye goes out next. The first reason stands.
   void close(wire::Goodbye::Reason reason, std::string text, Microseconds now);
@@ -112,6 +117,8 @@ class SessionProtocol {
   std::shared_ptr<FrameBodies> bodies_;
   proto::FrameReader reader_;
   SendQueue queue_;
+  SessionMemory::Share memory_;
+  std::size_t layer_bytes_ = 0;
   LinkPace pace_;
   std::size_t overdue_told_ = 0;  // of those that it dropped because it does not keep up, the scheduler knows so many
   DropCounts drops_told_{};

@@ -22,9 +22,13 @@ struct TcpListener::State {
         pending(options.max_pending) {}
 
   void on_socket(tcp::socket socket) {
-    if (!tls) return door->admit(make_connection(std::move(socket)));
-    greet(std::move(socket), tls, pending,
-          [door = door](const std::shared_ptr<Connection>& connection) { door->admit(connection); });
+    const auto peer = peer_of(socket);
+    if (!tls) return door->admit(make_connection(std::move(socket)), peer);
+    const auto ready = [door = door, peer](const std::shared_ptr<Connection>& connection) {
+      door->admit(connection, peer);
+    };
+    if (!greet(std::move(socket), tls, pending, peer, ready))
+      door->metrics().count("darm_session_events_total", 1, {{"what", "tcp_crowded"}});
   }
 
   std::shared_ptr<SessionDoor> door;

@@ -30,17 +30,20 @@ class Greeting : public std::enable_shared_from_this<Greeting> {
         timer_(lowest().get_executor()),
         ready_(std::move(ready)) {}
 
-  void begin(PendingSockets& pending) {
-    auto place = pending.enter([weak = weak_from_this()] {
-      if (const auto self = weak.lock()) self->close_soon();
-    });
-    if (!place) return;  // too many at a time: closed with this object
+  bool begin(PendingSockets& pending, const std::string& peer) {
+    auto place = pending.enter(
+        [weak = weak_from_this()] {
+          if (const auto self = weak.lock()) self->close_soon();
+        },
+        peer);
+    if (!place) return false;  // closed with this object
     place_.emplace(std::move(*place));
     timer_.expires_after(kGreetingTime);
     timer_.async_wait([self = shared_from_this()](error_code ec) {
       if (!ec) self->close();
     });
     lowest().async_wait(tcp::socket::wait_read, [self = shared_from_this()](error_code ec) { self->look(ec); });
+    return true;
   }
 
  private:
@@ -81,9 +84,9 @@ class Greeting : public std::enable_shared_from_this<Greeting> {
 
 }  // namespace
 
-void greet(tcp::socket socket, const std::shared_ptr<asio::ssl::context>& tls, PendingSockets& pending,
-           std::function<void(std::shared_ptr<Connection>)> ready) {
-  std::make_shared<Greeting>(std::move(socket), tls, std::move(ready))->begin(pending);
+bool greet(tcp::socket socket, const std::shared_ptr<asio::ssl::context>& tls, PendingSockets& pending,
+           const std::string& peer, std::function<void(std::shared_ptr<Connection>)> ready) {
+  return std::make_shared<Greeting>(std::move(socket), tls, std::move(ready))->begin(pending, peer);
 }
 
 }  // namespace darm::session

@@ -217,11 +217,14 @@ class Visit : public std::enable_shared_from_this<Visit<Stream>> {
 
   /// `place`: among the pending, given up when this becomes a session or ends.
   void begin() {
-    place_ = house_->pending.enter([weak = this->weak_from_this()] {
-      if (const auto self = weak.lock())
-        asio::dispatch(self->stream_.get_executor(), [self] { lowest(self->stream_).close(); });
-    });
-    if (!place_) return;
+    peer_ = peer_of(lowest(stream_).socket());
+    place_ = house_->pending.enter(
+        [weak = this->weak_from_this()] {
+          if (const auto self = weak.lock())
+            asio::dispatch(self->stream_.get_executor(), [self] { lowest(self->stream_).close(); });
+        },
+        peer_);
+    if (!place_) return house_->door.metrics().count("darm_session_events_total", 1, {{"what", "web_crowded"}});
     if constexpr (std::is_same_v<Stream, TlsStream>) {
       lowest(stream_).expires_after(kHandshakeTime);
       stream_.async_handshake(asio::ssl::stream_base::server, buffer_.data(),
@@ -276,11 +279,12 @@ class Visit : public std::enable_shared_from_this<Visit<Stream>> {
     set_stream_options(lowest(stream_).socket());
     count("101");
     auto connection = std::make_shared<WebSocketConnection<Stream>>(std::move(stream_), house_->options.tls);
-    connection->accept(parser_->release(), [house = house_, place = std::make_shared<decltype(place_)>(std::move(
-                                                                place_))](const std::shared_ptr<Connection>& ready) {
-      place->reset();
-      house->door.admit(ready);
-    });
+    connection->accept(parser_->release(),
+                       [house = house_, peer = peer_, place = std::make_shared<decltype(place_)>(std::move(place_))](
+                           const std::shared_ptr<Connection>& ready) {
+                         place->reset();
+                         house->door.admit(ready, peer);
+                       });
   }
 
   void count(std::string_view status) {
@@ -338,6 +342,7 @@ class Visit : public std::enable_shared_from_this<Visit<Stream>> {
   std::shared_ptr<House> house_;
   Stream stream_;
   beast::flat_buffer buffer_;
+  std::string peer_;
   std::optional<PendingSockets::Place> place_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   WebReply reply_;
@@ -353,10 +358,12 @@ class Arrival : public std::enable_shared_from_this<Arrival> {
       : house_(std::move(house)), stream_(std::move(socket)), buffer_(2 * kHeaderBytes) {}
 
   void begin() {
-    place_ = house_->pending.enter([weak = weak_from_this()] {
-      if (const auto self = weak.lock())
-        asio::dispatch(self->stream_.get_executor(), [self] { self->stream_.close(); });
-    });
+    place_ = house_->pending.enter(
+        [weak = weak_from_this()] {
+          if (const auto self = weak.lock())
+            asio::dispatch(self->stream_.get_executor(), [self] { self->stream_.close(); });
+        },
+        peer_of(stream_.socket()));
     if (!place_) return house_->door.metrics().count("darm_session_events_total", 1, {{"what", "web_crowded"}});
     stream_.expires_after(kHandshakeTime);
     beast::async_detect_ssl(stream_, buffer_, [self = shared_from_this()](error_code ec, bool tls) {

@@ -5,6 +5,22 @@
 
 namespace darm::tile_scheduler {
 
+std::vector<MemberLook> join_same_views(std::span<const MemberLook> looks) {
+  std::vector<MemberLook> out;
+  for (const auto& look : looks) {
+    const auto same = std::ranges::find_if(out, [&](const MemberLook& other) {
+      return other.view != nullptr && look.view != nullptr && same_view(*other.view, *look.view);
+    });
+    if (same == out.end()) {
+      out.push_back(look);
+      continue;
+    }
+    if (look.samples->samples() > same->samples->samples()) same->samples = look.samples;
+    same->looks += look.looks;
+  }
+  return out;
+}
+
 void SharedSet::add(const VisibleSet& samples, float looks) {
   if (samples.samples() <= 0) return;
   newest_.merge(samples, static_cast<float>(double{looks} / samples.samples()), kMaxTaps);

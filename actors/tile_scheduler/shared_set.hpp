@@ -1,10 +1,24 @@
 // What the members of a stream see, together. Pure.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "actors/tile_scheduler/seen.hpp"
+#include "actors/tile_scheduler/tile_scheduler_messages.hpp"
 #include "actors/types/frame_stamps.hpp"
 
 namespace darm::tile_scheduler {
+
+/// What one member sees, for the shared set.
+struct MemberLook {
+  const ViewChanged* view = nullptr;  ///< the camera that it was seen from; null: one of its own
+  const VisibleSet* samples = nullptr;
+  float looks = 1;  ///< see SharedSet::add()
+};
+/// Those of the very same view as one: what the one that knows most has seen, for the looks of all of them. A hundred
+/// who stand at one place (a page's first view) see the same thing a hundred times. In the order they came.
+[[nodiscard]] std::vector<MemberLook> join_same_views(std::span<const MemberLook> looks);
 
 /// Gathers what each member's looks bring, for about `keep`: few rays a look are enough where many look around. Each
 /// look of each member counts alike, whatever its size, so that no client buys more of a stream with a larger picture.

@@ -57,11 +57,11 @@ class Problem {
 
   /// Adds tiles to `chosen` by falling gain until the slots are full or nothing gains. Coarse tiles come first and are
   /// often outdone by finer ones later: those give their slots back.
-  void fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const;
+  void fill(std::vector<std::uint32_t>& chosen, double bonus) const;
   /// Takes out tiles whose every sample has a finer one among `chosen`. True if there were any.
   bool prune(std::vector<std::uint32_t>& chosen) const;
   /// Trades tiles that matter least for tiles that would gain most, while that helps.
-  void exchange(std::vector<std::uint32_t>& chosen, bool with_bonus) const;
+  void exchange(std::vector<std::uint32_t>& chosen, double bonus) const;
   /// Benefit if every allowed tile were chosen.
   [[nodiscard]] double upper_bound() const {
     double sum = 0;
@@ -139,7 +139,7 @@ class Problem {
   std::vector<Entry> entries_;
 };
 
-void Problem::fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
+void Problem::fill(std::vector<std::uint32_t>& chosen, double bonus) const {
   struct Candidate {
     double gain;
     std::uint32_t tile;
@@ -156,9 +156,7 @@ void Problem::fill(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
     take(tile, best);
     taken[tile] = true;
   }
-  const auto value = [&](std::uint32_t tile) {
-    return gain(tile, best) * (with_bonus && resident_[tile] ? 1.0 + double(options_.resident_bonus) : 1.0);
-  };
+  const auto value = [&](std::uint32_t tile) { return gain(tile, best) * (resident_[tile] ? 1.0 + bonus : 1.0); };
   std::vector<Candidate> initial;
   initial.reserve(tiles_.size());
   for (std::uint32_t tile = 0; tile < tiles_.size(); ++tile)
@@ -198,14 +196,14 @@ bool Problem::prune(std::vector<std::uint32_t>& chosen) const {
 
 // Greedy picks coarse tiles first; finer ones that come later leave some of them with little to do, yet never nothing.
 // Those are taken back, a share of the slots at a time, and the slots given anew.
-void Problem::exchange(std::vector<std::uint32_t>& chosen, bool with_bonus) const {
+void Problem::exchange(std::vector<std::uint32_t>& chosen, double bonus) const {
   double best = benefit_of(chosen);
   const std::size_t least = std::max<std::size_t>(1, chosen.size() / kLastExchange);
   std::size_t count = std::max(least, chosen.size() / kFirstExchange);
   while (count >= least) {
     auto trial = chosen;
     drop_least(trial, count);
-    fill(trial, with_bonus);
+    fill(trial, bonus);
     const double benefit = benefit_of(trial);
     if (benefit > best) {
       best = benefit;
@@ -288,18 +286,23 @@ Allocation allocate_slots(const AllocationRequest& request, const AllocationOpti
   // Greedy picks near the cut-off depend on small changes of weight. What is there stays unless that costs something.
   const double most = problem.upper_bound();
   Allocation stay;
+  std::vector<std::uint32_t> chosen;
   if (auto kept = problem.useful_residents(); !kept.empty() && kept.size() <= request.slots) {
-    problem.fill(kept, false);
+    problem.fill(kept, 0);
+    if (request.moves != Moves::kFreely) chosen = kept;
     stay = problem.result(std::move(kept));
     if (most - stay.benefit <= double(options.negligible) * most) return stay;
   }
-  std::vector<std::uint32_t> fresh;
-  problem.fill(fresh, true);
-  if (request.exchange) problem.exchange(fresh, true);
-  auto best = problem.result(std::move(fresh));
+  const bool anew = chosen.empty();
+  const double bonus = double(anew ? options.resident_bonus : options.resting_bonus);
+  if (anew) problem.fill(chosen, bonus);
+  if (request.exchange) problem.exchange(chosen, bonus);
+  auto best = problem.result(std::move(chosen));
   const double lost = std::max(0.0, most - best.benefit);
   const double spared = best.benefit - stay.benefit;
-  const double enough = std::max(double(options.least_improvement) * lost, double(options.negligible) * most);
+  const bool hardly = request.moves == Moves::kHardlyAny;
+  const double share = double(hardly ? options.rested_improvement : options.least_improvement);
+  const double enough = std::max(share * lost, double(options.negligible) * most);
   return !stay.tiles.empty() && spared <= enough ? stay : best;
 }
 

@@ -19,6 +19,17 @@ struct AllocationOptions {
   float resident_bonus = 0.05f;         ///< a resident tile's gain counts for this much more
   float least_improvement = 0.1f;       ///< residents stay if moving lessens what is lost by at most this share of it
   float negligible = 1e-4f;             ///< or by at most this share of the benefit that slots without limit would have
+  float resting_bonus = 1.0f;           ///< resident_bonus while Moves::kFew and kHardlyAny
+  float rested_improvement = 1.0f;      ///< least_improvement while Moves::kHardlyAny
+};
+
+/// How readily tiles change hands. Gains are measured on pictures whose light still converges, and the best of many
+/// that are known roughly is mostly the one that was measured too high: choosing anew whenever pictures have come moves
+/// hundreds of tiles each time, for ever, and leaves more lost than staying does.
+enum class Moves : std::uint8_t {
+  kFreely,     ///< other things are seen than before: the best choice, if it is worth it as a whole
+  kFew,        ///< the view rests: a resident gives way to a tile that brings twice as much (resting_bonus)
+  kHardlyAny,  ///< it has rested for long: and that only where as much again is lost as would be otherwise
 };
 
 struct AllocationRequest {
@@ -29,6 +40,7 @@ struct AllocationRequest {
   std::span<const ChainLoss> losses;
   std::size_t slots = 0;
   int coarse_level = 0;  ///< Layout::coarse_level()
+  Moves moves = Moves::kFreely;
   /// Also exchange tiles after the greedy choice: a few percent less is lost, for about twice the time.
   bool exchange = true;
 };

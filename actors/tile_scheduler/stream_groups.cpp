@@ -9,6 +9,8 @@
 namespace darm::tile_scheduler {
 namespace {
 
+constexpr std::size_t kFew = 64;
+
 bool within(std::size_t size, std::size_t slots, std::size_t largest, const GroupLimit& limit) {
   return static_cast<double>(size) <=
          std::max(limit.slots * static_cast<double>(slots), limit.own * static_cast<double>(largest));
@@ -81,6 +83,15 @@ class Clusters {
   std::vector<std::size_t> order_;  // by falling size
 };
 
+// About one in eight, always the same ones.
+std::vector<TileId> some_of(std::span<const TileId> tiles) {
+  std::vector<TileId> out;
+  for (const auto tile : tiles)
+    if (tiles.size() <= kFew || TileHash()(tile) % 8 == 0) out.push_back(tile);
+  std::ranges::sort(out);
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::vector<std::size_t>> cluster_sets(std::span<const std::span<const TileId>> sets, std::size_t slots,
@@ -108,7 +119,8 @@ std::size_t StreamGroups::union_of(StreamId stream) const {
 
 std::size_t StreamGroups::largest(const Group& group) const {
   std::size_t most = 0;
-  for (const auto id : group.members) most = std::max(most, members_.at(id).tiles.size());
+  for (const auto id : group.members)
+    if (const auto& member = members_.at(id); member.counts) most = std::max(most, member.tiles.size());
   return most;
 }
 
@@ -133,22 +145,48 @@ std::optional<StreamId> StreamGroups::room_for(const StreamFormat& format, std::
 StreamId StreamGroups::put(SessionId session, const StreamFormat& format, std::vector<TileId> tiles) {
   changed_ = true;
   if (const auto it = members_.find(session); it != members_.end()) {
-    auto& tally = groups_.at(it->second.stream).tally;
-    tally.remove(it->second.tiles);
-    tally.add(tiles);
-    it->second.tiles = std::move(tiles);
-    it->second.changes_to.reset();
-    if (!(groups_.at(it->second.stream).format == format)) {
-      it->second.changes_to = format;
+    auto& member = it->second;
+    auto& group = groups_.at(member.stream);
+    if (member.counts) group.tally.remove(member.tiles);
+    note_jump(member, group, tiles);
+    if (member.counts) group.tally.add(tiles);
+    member.tiles = std::move(tiles);
+    member.changes_to.reset();
+    if (!(group.format == format)) {
+      member.changes_to = format;
       formats_change_ = true;
     }
-    return it->second.stream;
+    return member.stream;
   }
   const auto found = room_for(format, tiles, tiles.size(), StreamId{});
   auto& member = members_[session];
+  member.some = some_of(tiles);
   member.tiles = std::move(tiles);
   enter(session, member, found ? *found : new_stream_(), format);
   return member.stream;
+}
+
+// From one set to the next. Of few each has a good part of the stream, and soon one of its own.
+void StreamGroups::note_jump(Member& member, const Group& group, std::span<const TileId> tiles) const {
+  auto now = some_of(tiles);
+  std::size_t left = 0;
+  for (const auto tile : member.some) left += std::ranges::binary_search(now, tile) ? 1 : 0;
+  const bool jumped = static_cast<double>(left) < options_.jumped * static_cast<double>(member.some.size());
+  member.some = std::move(now);
+  if (!jumped || group.members.size() < options_.crowd) return;
+  member.counts = false;
+  member.jumped_at.reset();
+}
+
+void StreamGroups::count_who_stays(Microseconds now) {
+  for (auto& [session, member] : members_) {
+    if (member.counts) continue;
+    if (!member.jumped_at) member.jumped_at = now;
+    if (now - *member.jumped_at < options_.stay_after) continue;
+    member.counts = true;
+    groups_.at(member.stream).tally.add(member.tiles);
+    changed_ = true;
+  }
 }
 
 void StreamGroups::remove(SessionId session) {
@@ -162,15 +200,16 @@ void StreamGroups::remove(SessionId session) {
 void StreamGroups::enter(SessionId session, Member& member, StreamId stream, const StreamFormat& format) {
   auto& group = groups_[stream];
   group.format = format;
+  if (group.members.empty()) member.counts = true;
   group.members.insert(std::ranges::lower_bound(group.members, session), session);
-  group.tally.add(member.tiles);
+  if (member.counts) group.tally.add(member.tiles);
   member.stream = stream;
 }
 
 void StreamGroups::leave(SessionId session, const Member& member) {
   const auto it = groups_.find(member.stream);
   std::erase(it->second.members, session);
-  it->second.tally.remove(member.tiles);
+  if (member.counts) it->second.tally.remove(member.tiles);
   if (it->second.members.empty()) groups_.erase(it);
 }
 
@@ -196,6 +235,7 @@ std::vector<GroupMove> StreamGroups::regroup(Microseconds now) {
   std::vector<GroupMove> moves;
   if (std::exchange(formats_change_, false)) change_formats(moves);
   if (!options_.share) return moves;
+  count_who_stays(now);
   std::vector<StreamId> due;
   for (auto& [id, group] : groups_) {
     const bool fits = within(group.tally.distinct(), slot_count(group.format), largest(group), options_.stay);
@@ -221,7 +261,8 @@ void StreamGroups::split(StreamId stream, std::vector<GroupMove>& moves) {
   auto& group = groups_.at(stream);
   group.over_since.reset();
   const auto format = group.format;
-  const auto everybody = group.members;
+  auto everybody = group.members;
+  std::erase_if(everybody, [&](SessionId id) { return !members_.at(id).counts; });  // these stay, whatever they see
   std::vector<std::span<const TileId>> sets;
   for (const auto id : everybody) sets.emplace_back(members_.at(id).tiles);
   const auto clusters = cluster_sets(sets, slot_count(format), options_.part);

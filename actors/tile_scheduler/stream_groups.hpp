@@ -28,6 +28,12 @@ struct GroupOptions {
   Microseconds join_after = 4'000'000;   ///< streams join when they would have fitted for so long
   Microseconds split_after = 1'000'000;  ///< and split when they have not fitted for so long
   Microseconds plan_every = 250'000;     ///< how often joins are looked for
+  /// One of so many or more whose set has less than this share of the one before in it has jumped: the union counts it
+  /// again when it has stayed for `stay_after`, and meanwhile it is served by what the stream has. Who jumps every
+  /// second widens nothing, and so neither splits the others nor keeps anybody from joining them.
+  std::size_t crowd = 8;
+  double jumped = 0.5;
+  Microseconds stay_after = 2'000'000;
 };
 
 /// A session goes to another stream.
@@ -71,6 +77,9 @@ class StreamGroups {
   struct Member {
     StreamId stream{};
     std::vector<TileId> tiles;
+    std::vector<TileId> some;               // of them, sorted: what tells a jump from a step
+    bool counts = true;                     // its tiles are in the tally
+    std::optional<Microseconds> jumped_at;  // if they are not; nothing: since the last regroup()
     std::optional<StreamFormat> changes_to;
   };
   struct Group {
@@ -86,6 +95,8 @@ class StreamGroups {
   [[nodiscard]] std::size_t largest(const Group& group) const;
   [[nodiscard]] std::optional<StreamId> room_for(const StreamFormat& format, std::span<const TileId> tiles,
                                                  std::size_t largest_of_them, StreamId but) const;
+  void note_jump(Member& member, const Group& group, std::span<const TileId> tiles) const;
+  void count_who_stays(Microseconds now);
   void enter(SessionId session, Member& member, StreamId stream, const StreamFormat& format);
   void leave(SessionId session, const Member& member);
   void move(SessionId session, StreamId to, const StreamFormat& format, bool split, std::vector<GroupMove>& moves);

@@ -56,6 +56,10 @@ struct SchedulerOptions {
   /// When a still view that does not fit its slots is weighed anew by what its pictures have come to show; then after
   /// twice that, and so on: slots change hands a few times at first, and then no more.
   Microseconds reweigh_interval = 1'000'000;
+  /// How long none of a stream's members has seen something else, nor anybody come who does, until tiles change hands
+  /// less readily; and since `lit`, too, until they hardly do. By then losses are measured on pictures of many samples.
+  Microseconds rests_after = 1'000'000;
+  Microseconds rested_after = 20'000'000;
   /// How long a stream's first frame waits for a first picture: encoding no tiles costs as much as encoding all.
   Microseconds first_frame_wait = 300'000;
   /// Least time between key frames that sessions of a stream ask for: each writes every slot and the whole page table.
@@ -172,6 +176,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool unchosen = false;          // there is more to see
     bool ungranted = false;         // pictures have come since then
     bool pictures_since = false;    // and since slots were chosen
+    Microseconds changed_at = 0;    // when one of its members, or one that came, last saw something else
+    Microseconds unlit_at = 0;      // when slots were last chosen for less than `lit`
     int reweighed = 0;              // times that they were chosen for nothing but that, since somebody saw more
     Microseconds asked_at = 0;      // for the first pictures
     std::optional<Microseconds> key_at;
@@ -221,7 +227,9 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void settle(Stream& stream);
   void group(Session& session);
   void gather(Stream& stream);
+  [[nodiscard]] static MemberLook look_of(const Session& session);
   void note_seen(Session& session);
+  [[nodiscard]] Moves moves_of(const Stream& stream) const;
   void choose_if_due(Stream& stream);
   void choose(Stream& stream);
   void set_targets(Stream& stream) const;

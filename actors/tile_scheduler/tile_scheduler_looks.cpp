@@ -120,6 +120,7 @@ bool TileSchedulerActor::look_with_another(Session& session) {
   if (moved) session.posed = session.view;
   session.set.adopt(best->set, moved, answer.stamps.view_started);
   if (session.stream && session.stream->shared() && best->stream != session.stream) note_seen(session);
+  if (moved && session.stream) session.stream->changed_at = session.last_start;
   know_view(session, answer);
   return true;
 }
@@ -184,6 +185,7 @@ void TileSchedulerActor::finish_view(Session& session) {
   const bool shared = session.stream && session.stream->shared();
   const int whole = passes_per_picture(session.posed->viewport);
   if (job->starts_pose) session.set.start_pose(traced, whole, !shared);
+  if (job->starts_pose && session.stream) session.stream->changed_at = traced;
   const int before = session.set.passes();
   const double samples = job->samples();
   for (auto& part : job->take_results()) {

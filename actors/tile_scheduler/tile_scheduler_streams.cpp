@@ -47,6 +47,7 @@ void TileSchedulerActor::enter(Session& session, StreamId id) {
   }
   stream->members.insert(std::ranges::lower_bound(stream->members, session.id, {}, &Session::id), &session);
   session.stream = stream.get();
+  if (known_share(session.set.current(), stream->known) < options_.known) stream->changed_at = now_us();
   session.awaits_key = session.unchosen = true;
   if (stream->members.size() == 2) gather(*stream);
   if (stream->members.size() > 2) note_seen(session);
@@ -146,17 +147,26 @@ void TileSchedulerActor::settle(Stream& stream) {
 }
 
 // What a session sees counts among what all of its stream see.
-void TileSchedulerActor::note_seen(Session& session) {
+MemberLook TileSchedulerActor::look_of(const Session& session) {
   const bool rests = session.set.passes() > 0;
-  session.stream->together.add(session.set.current(), rests ? SharedSet::kRests : 1.0f);
+  // While a first look from a new place is under way the set is still of the place before.
+  const bool from_there = session.posed && !(session.job && session.job->starts_pose);
+  return {from_there ? &*session.posed : nullptr, &session.set.current(), rests ? SharedSet::kRests : 1.0f};
+}
+
+void TileSchedulerActor::note_seen(Session& session) {
+  const auto look = look_of(session);
+  session.stream->together.add(*look.samples, look.looks);
 }
 
 // Forgets what nobody has seen for a while.
 void TileSchedulerActor::gather(Stream& stream) {
   const auto began = executor().thread_time();
   stream.together.renew(now_us());
-  for (auto* member : stream.members)
-    if (member->set.current().samples() > 0) note_seen(*member);
+  std::vector<MemberLook> looks;
+  for (const auto* member : stream.members)
+    if (member->set.current().samples() > 0) looks.push_back(look_of(*member));
+  for (const auto& look : join_same_views(looks)) stream.together.add(*look.samples, look.looks);
   const auto took = (executor().thread_time() - began).count();
   stream.together.renewed(took, now_us());
   metrics_.observe("darm_stream_gather_seconds", double(took) * 1e-6);
@@ -166,6 +176,12 @@ void TileSchedulerActor::choose_if_due(Stream& stream) {
   if (stream.unchosen && now_us() >= stream.choose_after) choose(stream);
 }
 
+Moves TileSchedulerActor::moves_of(const Stream& stream) const {
+  if (now_us() - stream.changed_at < options_.rests_after) return Moves::kFreely;
+  const auto rested = now_us() - std::max(stream.changed_at, stream.unlit_at);
+  return rested < options_.rested_after ? Moves::kFew : Moves::kHardlyAny;
+}
+
 // Chooses slots for what the members see together, and what is shaded for them.
 void TileSchedulerActor::choose(Stream& stream) {
   const auto started = executor().thread_time();
@@ -173,7 +189,8 @@ void TileSchedulerActor::choose(Stream& stream) {
   const auto rests = [](const Session* member) { return member->set.passes() >= kTapPasses; };
   const auto seen = stream.shared() ? stream.together.seen(std::ranges::all_of(stream.members, rests))
                                     : stream.members.front()->set.seen();
-  stream.demand = demand_of(seen, *layout_, stream.state.table(), images(), coarse_.get(), options_.allocation);
+  stream.demand =
+      demand_of(seen, *layout_, stream.state.table(), images(), coarse_.get(), options_.allocation, moves_of(stream));
   stream.known.clear();
   for (const auto& item : stream.demand.chains) stream.known.insert(item.chain);
   set_targets(stream);
@@ -181,6 +198,7 @@ void TileSchedulerActor::choose(Stream& stream) {
   for (auto* member : stream.members) member->unchosen = false;
   stream.unchosen = stream.ungranted = stream.pictures_since = false;
   stream.weighed_at = now_us();
+  if (stream.demand.lit < options_.lit) stream.unlit_at = stream.weighed_at;
   work_changed_ = true;
   metrics_.observe("darm_view_tiles", double(stream.demand.target.tiles.size()));
   note_chosen(stream, started);

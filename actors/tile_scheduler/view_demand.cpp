@@ -14,6 +14,8 @@ namespace {
 
 using renderer::TileRequest;
 
+constexpr float kMostlyLit = 0.8f;
+
 // The target's tiles by number, with what the requests need of them.
 struct Target {
   TileIndex tiles;
@@ -126,8 +128,9 @@ std::vector<renderer::CoarseRequest> coarse_texels_seen(const VisibleSet& seen, 
 }
 
 ViewDemand demand_of(const Seen& seen, const atlas::Layout& layout, const PageTable& table, const ImageLookup& images,
-                     const CoarseLuma* coarse, const AllocationOptions& options) {
+                     const CoarseLuma* coarse, const AllocationOptions& options, Moves moves) {
   ViewDemand demand;
+  demand.moves = moves;
   demand.chains = chains_of(seen);
   demand.crowded = sharp_tiles(demand.chains).size() > table.capacity();
   demand.rests = seen.rests;
@@ -140,6 +143,7 @@ ViewDemand demand_of(const Seen& seen, const atlas::Layout& layout, const PageTa
                                   .losses = demand.losses,
                                   .slots = table.capacity(),
                                   .coarse_level = layout.coarse_level(),
+                                  .moves = moves,
                                   .exchange = demand.rests},
                                  options);
   grant_available(demand, layout.coarse_level(), table, images, options);
@@ -168,6 +172,8 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
     demand.granted = demand.target;
     return;
   }
+  // While most pictures are still to come, what there are change from one moment to the next.
+  const bool begins = demand.lit < kMostlyLit;
   const auto residents = table.residents();
   demand.granted = allocate_slots({.chains = demand.chains,
                                    .residents = residents,
@@ -175,6 +181,7 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
                                    .losses = demand.losses,
                                    .slots = table.capacity(),
                                    .coarse_level = coarse_level,
+                                   .moves = begins ? Moves::kFreely : demand.moves,
                                    .exchange = false},  // for the time being only
                                   options);
 }

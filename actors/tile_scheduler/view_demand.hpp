@@ -20,6 +20,7 @@ struct ViewDemand {
   float lit = 0;                                ///< share of what the target serves whose tiles have pictures, 0..1
   bool crowded = false;                         ///< the sharp tiles do not all fit: what coarser ones lose decides
   bool rests = false;                           ///< it has been looked at closely: slots are chosen with more care
+  Moves moves = Moves::kFreely;                 ///< as slots were chosen
   std::vector<ChainLoss> losses;                ///< measured if crowded and there are pictures, else empty
   Allocation target;                            ///< the tiles it should have, pictures or not: these are shaded
   Allocation granted;                           ///< the tiles it can have now: these get slots
@@ -46,7 +47,7 @@ struct ViewDemand {
 /// levels lose is measured where there are more sharp tiles than slots; `coarse`: see measure_losses().
 [[nodiscard]] ViewDemand demand_of(const Seen& seen, const atlas::Layout& layout, const PageTable& table,
                                    const ImageLookup& images, const CoarseLuma* coarse,
-                                   const AllocationOptions& options);
+                                   const AllocationOptions& options, Moves moves = Moves::kFreely);
 
 /// Sets `demand.lit`; true if every tile of the target has a picture.
 bool note_lit(ViewDemand& demand, const ImageLookup& images);

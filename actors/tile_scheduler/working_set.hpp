@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "actors/tile_scheduler/seen.hpp"
 #include "actors/types/frame_stamps.hpp"
@@ -13,7 +14,8 @@ struct WorkingSetOptions {
   float previous_weight = 0.25f;         ///< weight of a share of its samples, in 0..1
 };
 
-/// Accumulates the passes of one session's view. Bounded by VisibleSet's limits, three times.
+/// Accumulates the passes of one session's view. Bounded by VisibleSet's limits, three times. Those that adopt from
+/// each other hold the same set, until one of them sees more.
 class WorkingSet {
  public:
   explicit WorkingSet(WorkingSetOptions options = {});
@@ -30,13 +32,16 @@ class WorkingSet {
   bool expire(Microseconds now);
 
   [[nodiscard]] int passes() const { return passes_; }
-  [[nodiscard]] const VisibleSet& current() const { return current_; }
+  [[nodiscard]] const VisibleSet& current() const { return *current_; }
   /// Present and before. Valid until the next change.
   [[nodiscard]] Seen seen() const;
 
  private:
+  [[nodiscard]] bool alone() const { return current_.use_count() == 1; }
+  VisibleSet& own();
+
   WorkingSetOptions options_;
-  VisibleSet current_;
+  std::shared_ptr<VisibleSet> current_ = std::make_shared<VisibleSet>();  // never null; changed by its only holder
   VisibleSet previous_;  // the pose before; or what was glanced at since previous_at_,
   VisibleSet older_;     // and before that
   Microseconds moved_at_ = 0;

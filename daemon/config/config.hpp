@@ -101,6 +101,8 @@ struct StreamConfig {
 /// [session]
 struct SessionConfig {
   std::uint32_t max_sessions = 64;
+  std::uint32_t max_sessions_per_address = 64;  ///< of an IPv4 address, or of the /64 of an IPv6 one
+  std::uint64_t max_memory_bytes = 4ull << 30;  ///< send queues and private layers of all together
   double handshake_timeout_s = 10;
   double idle_timeout_s = 30;
   std::uint64_t send_queue_bytes = 64u << 20;  ///< a slower client is cut off

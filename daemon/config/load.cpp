@@ -139,6 +139,8 @@ void read_web(TableReader& root, Config& config, const std::filesystem::path& fi
 void read_service(TableReader& root, Config& config) {
   root.table("session", [&](TableReader& reader) {
     reader.integer("max_sessions", config.session.max_sessions, 1, 100000);
+    reader.integer("max_sessions_per_address", config.session.max_sessions_per_address, 1, 100000);
+    reader.integer("max_memory_bytes", config.session.max_memory_bytes, 16 << 20, kMaxBytes);
     reader.number("handshake_timeout_s", config.session.handshake_timeout_s, 0.1, 3600);
     reader.number("idle_timeout_s", config.session.idle_timeout_s, 1, 86400);
     reader.integer("send_queue_bytes", config.session.send_queue_bytes, 1 << 20, kMaxBytes);

@@ -51,6 +51,8 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_renderer_tiles_shaded_total", "Tiles that got samples"},
     {"darm_session_bytes_sent_total", "Bytes written to clients"},
     {"darm_session_events_total", "Faults and refusals of sessions, by what happened"},
+    {"darm_session_memory_bytes",
+     "What waits to be sent and private layers, of all sessions, against max_memory_bytes"},
     {"darm_session_pictures_dropped_total", "Pictures not sent to a client, by reason"},
     {"darm_sessions_set_apart_total", "Sessions that did not keep up and went to a stream of such sessions"},
     {"darm_sessions_slow", "Sessions on streams of those that do not keep up, now"},

@@ -155,6 +155,36 @@ TEST_F(LoopbackTest, one_client_too_many_is_told_so) {
   EXPECT_FALSE(third.hear().has_value());
 }
 
+TEST_F(LoopbackTest, one_client_too_many_of_an_address_is_told_so) {
+  around->addresses = std::make_shared<AddressPlaces>(1);
+  std::optional<Client> first(listener->port());
+  ASSERT_TRUE(join(*first).has_value());
+  Client second(listener->port());
+  const auto got = second.hear();
+  ASSERT_TRUE(got && got->has_goodbye());
+  EXPECT_EQ(got->goodbye().reason(), wire::Goodbye::SERVER_FULL);
+  EXPECT_NE(got->goodbye().text().find("this address"), std::string::npos) << got->goodbye().text();
+  EXPECT_FALSE(second.hear().has_value());
+  first.reset();
+  EXPECT_TRUE(eventually([&] { return around->addresses->addresses() == 0; }));
+  Client third(listener->port());
+  EXPECT_TRUE(join(third).has_value()) << "the place is free again";
+}
+
+TEST_F(LoopbackTest, a_client_is_turned_away_while_the_others_hold_as_much_as_they_may) {
+  around->policy.memory = std::make_shared<SessionMemory>(1000);
+  {
+    SessionMemory::Share others(around->policy.memory);
+    others.set(1001);
+    Client client(listener->port());
+    const auto got = client.hear();
+    ASSERT_TRUE(got && got->has_goodbye());
+    EXPECT_EQ(got->goodbye().reason(), wire::Goodbye::SERVER_FULL);
+  }
+  Client client(listener->port());
+  EXPECT_TRUE(join(client).has_value());
+}
+
 TEST_F(LoopbackTest, a_version_that_is_not_spoken_is_refused_in_words) {
   Client client(listener->port());
   auto e = hello();

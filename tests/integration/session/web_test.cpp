@@ -41,7 +41,7 @@ class WebTest : public SessionWorld {
     WebListenerOptions options;
     options.address = "127.0.0.1";
     options.max_sessions = 2;
-    options.max_pending = 8;
+    options.max_pending = 16;  // of which one address has half
     options.files = kFiles;
     options.tls = tls;
     web = WebListener::open(io, system, around, options).value();
@@ -274,6 +274,23 @@ TEST_F(WebTest, one_client_too_many_is_told_so_in_a_message) {
   ASSERT_TRUE(got && got->has_goodbye());
   EXPECT_EQ(got->goodbye().reason(), wire::Goodbye::SERVER_FULL);
   EXPECT_FALSE(hear(third));
+}
+
+TEST_F(WebTest, clients_of_an_address_count_together_by_whichever_port_they_came) {
+  around->addresses = std::make_shared<AddressPlaces>(1);
+  std::optional<tcp::socket> by_tcp(connect(bare->port()));
+  asio::write(*by_tcp, asio::buffer(proto::frame(hello())));
+  ASSERT_TRUE(eventually([&] { return around->live->load() == 1; }));
+  websocket::stream<tcp::socket> by_web(connect(web->port()));
+  join(by_web);
+  const auto got = hear(by_web);
+  ASSERT_TRUE(got && got->has_goodbye());
+  EXPECT_EQ(got->goodbye().reason(), wire::Goodbye::SERVER_FULL);
+  by_tcp->close();
+  by_tcp.reset();
+  ASSERT_TRUE(eventually([&] { return around->addresses->addresses() == 0; }));
+  websocket::stream<tcp::socket> later(connect(web->port()));
+  EXPECT_TRUE(enter(later));
 }
 
 TEST_F(WebTest, a_client_that_vanishes_leaves_nothing_behind) {

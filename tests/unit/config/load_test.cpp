@@ -71,6 +71,8 @@ TEST(DocumentedConfig, EqualsTheDefaults) {
   EXPECT_EQ(a.stream.chroma_444, b.stream.chroma_444);
   EXPECT_EQ(a.stream.allow_lossless, b.stream.allow_lossless);
   EXPECT_EQ(a.session.max_sessions, b.session.max_sessions);
+  EXPECT_EQ(a.session.max_sessions_per_address, b.session.max_sessions_per_address);
+  EXPECT_EQ(a.session.max_memory_bytes, b.session.max_memory_bytes);
   EXPECT_EQ(a.session.handshake_timeout_s, b.session.handshake_timeout_s);
   EXPECT_EQ(a.session.idle_timeout_s, b.session.idle_timeout_s);
   EXPECT_EQ(a.session.send_queue_bytes, b.session.send_queue_bytes);

@@ -428,5 +428,57 @@ TEST_F(SessionProtocolTest, the_scheduler_hears_when_the_link_is_full_and_when_i
   EXPECT_TRUE(protocol->on_tick(8 * kSecond).empty()) << "nothing is told twice";
 }
 
+TEST_F(SessionProtocolTest, a_client_has_no_private_layer_where_there_is_no_memory_for_one) {
+  SessionPolicy policy;
+  policy.view_phystex = 1024;
+  policy.memory = std::make_shared<SessionMemory>(private_layer_bytes(1024) + (4u << 20));
+  const auto offered = [&](SessionPolicy p, Actions* actions) {
+    start(std::move(p));
+    auto e = hello();
+    e.mutable_hello()->set_max_view_phystex(1024);
+    *actions = say(e);
+    return heard().front().welcome().view_phystex();
+  };
+  Actions actions;
+  EXPECT_EQ(offered(policy, &actions), 1024u);
+  const auto first = std::move(protocol);
+  EXPECT_GE(policy.memory->held(), private_layer_bytes(1024));
+  EXPECT_EQ(offered(policy, &actions), 0u);
+  EXPECT_EQ(count<Noted>(actions), 1) << "counted, by what happened";
+  EXPECT_EQ(count<tile_scheduler::SessionOpened>(actions), 1) << "the shared light it has all the same";
+}
+
+TEST_F(SessionProtocolTest, pictures_do_not_wait_where_sessions_hold_as_much_as_they_may) {
+  SessionPolicy policy;
+  policy.memory = std::make_shared<SessionMemory>(1'000'000);
+  start(policy);
+  (void)say(hello());
+  (void)heard();
+  const auto frame = [](FrameNumber number, bool key) {
+    auto f = std::make_shared<EncodedFrame>();
+    f->stream = StreamId{1};
+    f->frame = number;
+    f->key = key;
+    f->h264.resize(300'000);
+    return FrameEncoded(f, {});
+  };
+  (void)protocol->on_frame(frame(1, true), 2);
+  EXPECT_FALSE(protocol->next_packets(2).empty());  // under way, and what follows waits
+  Actions actions = protocol->on_frame(frame(2, false), 3);
+  EXPECT_EQ(count<PicturesDropped>(actions), 0);
+  {
+    SessionMemory::Share others(policy.memory);
+    others.set(900'000);
+    actions = protocol->on_frame(frame(3, false), 4);
+  }
+  ASSERT_GE(count<PicturesDropped>(actions), 1);
+  bool said = false;
+  for (const auto& a : actions)
+    if (const auto* dropped = std::get_if<PicturesDropped>(&a)) said = said || dropped->why == "memory";
+  EXPECT_TRUE(said);
+  protocol->note_memory();
+  EXPECT_LT(policy.memory->held(), 100'000u);
+}
+
 }  // namespace
 }  // namespace darm::session

@@ -188,5 +188,38 @@ TEST(SignificantTiles, AreTheFewThatShowMostOfAView) {
   EXPECT_TRUE(significant_tiles({}, 0.9).empty());
 }
 
+TEST(SharedSet, ThoseAtTheVerySamePlaceAreGatheredOnce) {
+  const auto camera = look_at({0, 0, 0}, {1, 0, 0}, 60), other = look_at({0, 0, 1}, {1, 0, 0}, 60);
+  const ViewChanged here(SessionId{1}, 1, camera, {}, {}), also_here(SessionId{2}, 9, camera, {}, {});
+  const ViewChanged there(SessionId{3}, 1, other, {}, {});
+  const auto little = view_at(0, 0, 4, 1), much = view_at(0, 0, 20, 1), elsewhere = view_at(90, 90, 9, 2);
+  const std::vector<MemberLook> looks{{&here, &little, 1}, {&there, &elsewhere, 2}, {&also_here, &much, 10}};
+  const auto joined = join_same_views(looks);
+  ASSERT_EQ(joined.size(), 2u);
+  EXPECT_EQ(joined[0].samples, &much) << "what the one that knows most has seen";
+  EXPECT_EQ(joined[0].looks, 11) << "counts for both";
+  EXPECT_EQ(joined[1].samples, &elsewhere);
+  EXPECT_EQ(joined[1].looks, 2);
+}
+
+TEST(SharedSet, WhoseFirstLookFromAPlaceIsUnderWayIsLikeNobody) {
+  const auto view = view_at(0, 0, 4, 1);
+  const std::vector<MemberLook> looks{{nullptr, &view, 1}, {nullptr, &view, 1}};
+  EXPECT_EQ(join_same_views(looks).size(), 2u);
+}
+
+TEST(SharedSet, GatheringThoseAtOnePlaceOnceChangesNothing) {
+  const auto camera = look_at({0, 0, 0}, {1, 0, 0}, 60), other = look_at({0, 0, 1}, {1, 0, 0}, 60);
+  const ViewChanged here(SessionId{1}, 1, camera, {}, {}), there(SessionId{2}, 1, other, {}, {});
+  const auto same = view_at(0, 0, 12, 1), elsewhere = view_at(7, 3, 9, 2);
+  std::vector<MemberLook> looks(20, MemberLook{&here, &same, SharedSet::kRests});
+  looks.push_back({&there, &elsewhere, 1});
+  SharedSet one_by_one, together;
+  for (const auto& look : looks) one_by_one.add(*look.samples, look.looks);
+  for (const auto& look : join_same_views(looks)) together.add(*look.samples, look.looks);
+  EXPECT_NEAR(weight_of(together, same), weight_of(one_by_one, same), 1e-4);
+  EXPECT_NEAR(weight_of(together, elsewhere), weight_of(one_by_one, elsewhere), 1e-4);
+}
+
 }  // namespace
 }  // namespace darm::tile_scheduler

@@ -88,6 +88,53 @@ TEST(SlotAllocation, ServesEveryChainByTheFinestTileGranted) {
   }
 }
 
+// However few the slots: CoarseTex, which a client always has whole, stands in, and never for what has a tile.
+TEST(SlotAllocation, NoSampleIsWithoutALevelThatIsThere) {
+  testing::Random rng(3);
+  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+    const RandomView view(seed);
+    for (const std::size_t slots : {0u, 1u, 9u, 64u}) {
+      auto request = view.request(slots);
+      request.moves = static_cast<Moves>(rng() % 3);
+      const auto before = allocate_slots(view.request(slots)).tiles;
+      request.residents = before;
+      request.available = [&](TileId t) { return (t.index() + seed) % 3 != 0; };
+      const auto a = allocate_slots(request);
+      const std::set<TileId> held(a.tiles.begin(), a.tiles.end());
+      ASSERT_EQ(a.served.size(), view.chains.size());
+      for (std::size_t c = 0; c < a.served.size(); ++c) {
+        const auto& tiles = view.chains[c].chain.tiles;
+        if (a.served[c] < kServedByCoarse) {
+          ASSERT_TRUE(held.contains(tiles[a.served[c]]));
+        } else {
+          ASSERT_EQ(a.served[c], kServedByCoarse);
+          for (const auto tile : tiles) ASSERT_FALSE(held.contains(tile));
+        }
+      }
+    }
+  }
+}
+
+TEST(SlotAllocation, AViewThatRestsGivesAResidentUpOnlyForATileThatBringsTwiceAsMuch) {
+  // Two tiles of one level, one slot. The one that is there shows `held`, the other `wanted`.
+  const auto stays = [](float held, float wanted, Moves moves) {
+    std::vector<WeightedChain> chains{{Chain{}, held}, {Chain{}, wanted}};
+    chains[0].chain.tiles[0] = TileId(0, 0);
+    chains[1].chain.tiles[0] = TileId(0, 1);
+    const std::vector<TileId> residents{TileId(0, 0)};
+    AllocationRequest request{.chains = chains, .residents = residents, .losses = {}};
+    request.slots = 1;
+    request.coarse_level = 6;
+    request.moves = moves;
+    return allocate_slots(request).tiles == residents;
+  };
+  EXPECT_TRUE(stays(0.4f, 0.7f, Moves::kFew));
+  EXPECT_FALSE(stays(0.3f, 0.7f, Moves::kFew));
+  EXPECT_FALSE(stays(0.4f, 0.7f, Moves::kFreely));
+  EXPECT_TRUE(stays(0.0011f, 0.002f, Moves::kHardlyAny));
+  EXPECT_FALSE(stays(0.1f, 0.7f, Moves::kHardlyAny)) << "seven times as much is lost as would be";
+}
+
 TEST(SlotAllocation, GrantsEverySharpTileWhenTheyFit) {
   const RandomView view(3);
   const auto a = allocate_slots(view.request(5000));

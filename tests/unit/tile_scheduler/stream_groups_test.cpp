@@ -32,6 +32,7 @@ GroupOptions timed() {
   GroupOptions options;
   options.join_after = 2'000'000;
   options.split_after = 500'000;
+  options.jumped = 0;  // a set that changes counts at once
   return options;
 }
 
@@ -335,6 +336,66 @@ TEST(TileTally, CountsUnionsAsSetsComeAndGo) {
     ASSERT_EQ(tally.tiles().size(), counts.size());
     for (const auto& [tile, count] : counts) ASSERT_EQ(tally.count(tile), count);
   }
+}
+
+// Default times: 1 s until a split, 2 s until who has jumped counts again.
+class JumpsTest : public StreamGroupsTest {
+ protected:
+  JumpsTest() {
+    groups_ = StreamGroups(GroupOptions{}, [this] { return StreamId{next_++}; });
+  }
+};
+
+TEST_F(JumpsTest, WhoLooksFromSomewhereElseEverySecondSplitsNobody) {
+  for (std::size_t i = 0; i < 10; ++i) put(i, tiles(0, 60));
+  const auto together = at(0);
+  for (std::uint32_t second = 1; second <= 30; ++second) {
+    for (std::size_t i = 7; i < 10; ++i) put(i, tiles(1000 * second + 100 * static_cast<std::uint32_t>(i), 60));
+    ASSERT_TRUE(wait(kSecond).empty()) << second;
+    ASSERT_EQ(groups_.union_of(together), 60u) << "nor does it keep anybody out";
+  }
+  EXPECT_EQ(put(10, tiles(10, 60)), together);
+}
+
+TEST_F(JumpsTest, WhoStaysWhereItHasJumpedToGetsAStreamForIt) {
+  for (std::size_t i = 0; i < 8; ++i) put(i, tiles(0, 60));
+  const auto together = at(0);
+  put(3, tiles(1000, 60));
+  EXPECT_TRUE(wait(2 * kSecond).empty());
+  const auto moves = wait(2 * kSecond);
+  ASSERT_EQ(moves.size(), 1u);
+  EXPECT_EQ(moves[0].session, session(3));
+  EXPECT_EQ(groups_.union_of(together), 60u);
+  EXPECT_EQ(groups_.union_of(at(3)), 60u);
+}
+
+TEST_F(JumpsTest, OneOfFewIsPartedFromThemAsSoonAsItDoesNotFit) {
+  for (std::size_t i = 0; i < 3; ++i) put(i, tiles(0, 60));
+  put(2, tiles(1000, 60));
+  EXPECT_EQ(wait(2 * kSecond).size(), 1u);
+}
+
+TEST_F(JumpsTest, AWalkIsNoJump) {
+  for (std::size_t i = 0; i < 8; ++i) put(i, tiles(0, 60));
+  for (std::uint32_t step = 1; step <= 5; ++step) {
+    put(0, tiles(20 * step, 60));
+    static_cast<void>(groups_.regroup(now_ += kSecond / 10));
+  }
+  EXPECT_EQ(groups_.union_of(at(1)), 120u) << "two thirds of what it sees it saw before";
+}
+
+TEST_F(JumpsTest, WhoLeavesTakesWithItWhatItCountedAndNoMore) {
+  for (std::size_t i = 0; i < 9; ++i) put(i, tiles(0, 60));
+  const auto together = at(0);
+  put(7, tiles(1000, 20));
+  put(8, tiles(2000, 20));
+  EXPECT_EQ(groups_.union_of(together), 60u);
+  groups_.remove(session(7));
+  EXPECT_EQ(groups_.union_of(together), 60u);
+  EXPECT_TRUE(wait(3 * kSecond).empty());
+  EXPECT_EQ(groups_.union_of(together), 80u) << "the other has stayed";
+  groups_.remove(session(8));
+  EXPECT_EQ(groups_.union_of(together), 60u);
 }
 
 }  // namespace

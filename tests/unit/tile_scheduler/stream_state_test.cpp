@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 
 #include "tests/unit/tile_scheduler/random.hpp"
@@ -241,6 +242,45 @@ TEST(StreamState, NewTilesComeBeforeRefinementsWithinTheLimit) {
   const auto next = stream.step(wanted, images.lookup(), 0, 1);
   ASSERT_EQ(next.frame->writes.size(), 2u);
   EXPECT_EQ(next.frame->edits.size(), 2u);
+}
+
+// Whatever was wanted before: so many updates, and no more, until everything is there that is still wanted.
+TEST(StreamState, EachTileThatStaysWantedIsThereAfterSlotsOverWritesUpdates) {
+  for (std::uint32_t seed = 1; seed <= 200; ++seed) {
+    testing::Random random(seed);
+    StreamOptions options;
+    options.max_writes = 1 + random() % 6;
+    options.refine_interval = random() % 3;
+    StreamState stream(small(), options);
+    Client client;
+    Images images;
+    Microseconds now = 0;
+    const auto update = [&](const std::vector<TileId>& wanted) {
+      auto step = stream.step(wanted, images.lookup(), 0, ++now);
+      if (!step.frame) return;
+      client.apply(*step.frame);
+      stream.frame_done(step.frame->frame, true);
+    };
+    const auto choose = [&](std::size_t count) {
+      std::vector<TileId> wanted;
+      while (wanted.size() < count) {
+        const TileId tile(static_cast<int>(random() % 3), random() % 40);
+        if (std::ranges::find(wanted, tile) == wanted.end()) wanted.push_back(tile);
+        images.put(tile, 1 + random() % 5);
+      }
+      return wanted;
+    };
+    for (int moves = 0; moves < 10; ++moves) update(choose(random() % 17));
+    const std::size_t slots = stream.table().capacity();
+    const auto wanted = choose(1 + random() % slots);
+    const auto longest = (slots + options.max_writes - 1) / options.max_writes;
+    for (std::size_t i = 0; i < longest; ++i) {
+      images.put(wanted[random() % wanted.size()], 10 + static_cast<std::uint32_t>(i));  // light goes on meanwhile
+      update(wanted);
+    }
+    for (const auto tile : wanted)
+      ASSERT_TRUE(client.table.contains(tile)) << "seed " << seed << ", " << options.max_writes << " writes an update";
+  }
 }
 
 TEST(StreamState, RefinementsWaitForTheIntervalButNewTilesDoNot) {

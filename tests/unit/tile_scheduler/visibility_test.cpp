@@ -333,6 +333,24 @@ TEST(WorkingSet, KeepsThePreviousPoseForItsTimeAtALowerWeight) {
   EXPECT_NEAR(total(), hits_b, 1e-3);
 }
 
+TEST(WorkingSet, ThoseThatAdoptHoldOneSetUntilOneSeesMore) {
+  VisibleSet first, second;
+  first.add(Chain{{TileId(0, 1)}}, 1);
+  first.add_samples(1);
+  second.add(Chain{{TileId(0, 2)}}, 1);
+  second.add_samples(1);
+  WorkingSet one, other;
+  one.add(first, 1);
+  other.adopt(one, true, 0);
+  EXPECT_EQ(&one.current(), &other.current()) << "a hundred at one place hold it once";
+  one.add(second, 1);
+  EXPECT_EQ(one.current().chains().size(), 2u);
+  EXPECT_EQ(other.current().chains().size(), 1u) << "and what one sees later is its own";
+  other.adopt(one, false, 0);
+  other.start_pose(1, kPassesPerPicture);
+  EXPECT_EQ(one.current().chains().size(), 2u) << "nor does it lose anything when the other goes";
+}
+
 TEST(WorkingSet, KeepsAllThatWasGlancedAtOnTheWayButNotForEver) {
   WorkingSetOptions options;
   options.keep_previous = 1000;
