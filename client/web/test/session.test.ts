@@ -42,7 +42,7 @@ async function manifest(): Promise<void> {
   const zeros = deflateSync(new Uint8Array([0xa0, ...new Array<number>(12 + 32).fill(0)]));
   browser.line.say({case: 'manifest', value: create(SceneManifestSchema, {
     tag: 77n, q: 8, patchCount: 2, patchTable: new Uint8Array(zeros), bounds: [0, 0, 0, 1, 1, 1], chartCount: 1,
-    levels: [{density: 8, width: 30, height: 30, tilesX: 1, tilesY: 1}], origin: {x: 0, y: 0, z: 0}})});
+    levels: [{density: 8, width: 30, height: 30, tilesX: 1, tilesY: 1}], origin: {x: 0, y: 0, z: 0}, sky: new Array<number>(9).fill(0)})});
   await browser.settle();
 }
 
