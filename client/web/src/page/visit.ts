@@ -205,6 +205,7 @@ export class Visit implements InputOwner {
     this.scene = scene;
     this.chunks = [];
     this.coarse = null;
+    this.status.finest = false;  // there is no picture of it to keep
     document.title = scene.name ? `${scene.name} – DARM` : 'DARM';
     const {mode, pivot} = this.rig;
     const bounds = {low: plus(scene.low, scene.origin), high: plus(scene.high, scene.origin)};
@@ -460,8 +461,8 @@ export class Visit implements InputOwner {
   private showMode(): void {
     const orbit = this.rig.mode === 'orbit';
     const button = document.getElementById('mode')!;
-    button.setAttribute('aria-pressed', String(orbit));
     button.textContent = orbit ? 'Orbit' : 'Walk';
+    button.setAttribute('aria-label', orbit ? 'Moving: orbit' : 'Moving: walk');
   }
 
   private writeLink(): void {
