@@ -93,7 +93,8 @@ std::shared_ptr<const CoarsePicture> CoarseCanvas::finish() {
           (t / tiles_.x * kTileSize + i / kTileSize) * picture_->width + t % tiles_.x * kTileSize + i % kTileSize;
       for (std::size_t c = 0; c < 3; ++c) sum[c] += picture_->rgb[at * 3 + c];
     }
-    for (std::size_t c = 0; c < 3; ++c) colour[t][c] = static_cast<std::uint8_t>(sum[c] / kTileTexels);
+    // Grey: the colour would be another thing's.
+    colour[t].fill(static_cast<std::uint8_t>((2126 * sum[0] + 7152 * sum[1] + 722 * sum[2]) / (10'000 * kTileTexels)));
     queue.push_back(t);
   }
   TileImage flat;

@@ -64,7 +64,7 @@ class CoarseCanvas {
  public:
   CoarseCanvas(LevelTiles tiles, std::uint32_t version);
   void put(std::uint32_t tile_index, const TileImage& image);
-  /// Gives tiles that were not put the mean colour of the nearest one that was.
+  /// Gives tiles that were not put the mean brightness of the nearest one that was, as a grey.
   [[nodiscard]] std::shared_ptr<const CoarsePicture> finish();
 
  private:

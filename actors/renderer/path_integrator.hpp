@@ -18,8 +18,9 @@ namespace detail {
   return std::isfinite(v.x + v.y + v.z) ? glm::max(v, glm::vec3(0.0f)) : glm::vec3(0.0f);
 }
 
+// The back of a single-sided surface, unless light may come through from its front: the far wall of a frosted body.
 [[nodiscard]] inline bool sees_black(const scene::Material& m, bool front) {
-  return !front && !m.double_sided && !(m.thickness > 0 && m.transmission > 0);
+  return !front && !m.double_sided && !(m.transmission > 0);
 }
 [[nodiscard]] inline bool sees_black(const trace::Surface& s) { return sees_black(*s.placed->material, s.front); }
 

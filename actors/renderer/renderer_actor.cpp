@@ -340,7 +340,7 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
   if (job.recall) {
     if (const auto stored = store.picture(job.tile, shared.picture_tag)) picture = from_stored(*stored);
   } else {
-    picture = display.draw(job.tile, shared.level_of(job.tile), job.mask);
+    picture = display.draw(job.tile, shared.level_of(job.tile), job.mask, job.coarse ? Unlit::kGrey : Unlit::kAsBeside);
     if (picture && job.keep) store.put_picture(job.tile, shared.picture_tag, to_stored(*picture));
   }
   if (job.coarse) {

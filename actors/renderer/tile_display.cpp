@@ -191,7 +191,7 @@ float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const
   return static_cast<float>(std::sqrt((squares + std::max(smear, 0.0)) / texels));
 }
 
-std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level, const TexelMask& mask) {
+std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level, const TexelMask& mask, Unlit unlit) {
   look_around(id, level);
   if (wants_filter(mask)) {
     gather();
@@ -205,7 +205,13 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   if (std::none_of(colours.fill.known.begin(), colours.fill.known.end(), [](bool k) { return k; })) return std::nullopt;
   const auto known = colours.fill.known;  // before the others are filled
   colours.fill.replace_by_neighbours(colours.lightless);
-  colours.fill.run();
+  if (unlit == Unlit::kGrey)
+    colours.fill.run_neutral([](const std::array<float, 3>& mean) {
+      const float grey = luminance(glm::vec3(mean[0], mean[1], mean[2]));
+      return std::array{grey, grey, grey};
+    });
+  else
+    colours.fill.run();
 
   auto image = std::make_shared<TileImage>();
   for (std::size_t at = 0; at < kSlotTexels; ++at)

@@ -27,6 +27,12 @@ struct TilePicture {
   float samples = 0;  ///< mean samples per texel of the mask
 };
 
+/// What patches of a slot show of which nothing is known.
+enum class Unlit : std::uint8_t {
+  kAsBeside,  ///< the colours beside them: nobody sees them, and an even picture is few bits
+  kGrey,      ///< as bright as the rest, but grey: whoever comes to see them sees no colour of something else
+};
+
 /// Makes pictures; keeps scratch memory, so one per thread. Reads the store and the facts: nobody may write them then.
 class TileDisplay {
  public:
@@ -36,11 +42,12 @@ class TileDisplay {
       : store_(store), facts_(facts), options_(options), coarse_(coarse) {}
 
   /// The slot's 32x32 texels: payload and border (from the neighbour tiles where they are shaded), soft light filtered,
-  /// texels without samples lit as the coarse level has their place, else filled from their patch, then from anything.
-  /// Lightless texels give the filter nothing, and show the mean of the lit ones beside them, if there are any: a
+  /// texels without samples lit as the coarse level has their place, else filled from their patch, then as `unlit`
+  /// says. Lightless texels give the filter nothing, and show the mean of the lit ones beside them, if there are any: a
   /// client's bilinear tap at a contact reads them.
   /// nullopt if nothing is known of any texel of the slot.
-  std::optional<TilePicture> draw(TileId id, const LevelTiles& level, const TexelMask& mask);
+  std::optional<TilePicture> draw(TileId id, const LevelTiles& level, const TexelMask& mask,
+                                  Unlit unlit = Unlit::kAsBeside);
 
   /// The soft light of the slot drawn last as it was filtered; not known where it was not.
   [[nodiscard]] std::span<const FilteredTexel> filtered() const { return filtered_; }

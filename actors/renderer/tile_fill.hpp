@@ -27,6 +27,26 @@ struct SlotFill {
     spread(true);
     spread(false);
   }
+  /// Within patches first; patches without a known texel then have the mean of the slot's known ones, as `neutral`
+  /// makes it of that; what is nobody's comes last.
+  template <class F>
+  void run_neutral(F&& neutral) {
+    Value sum{};
+    float n = 0;
+    for (std::size_t at = 0; at < value.size(); ++at) {
+      if (!known[at]) continue;
+      for (std::size_t c = 0; c < Channels; ++c) sum[c] += value[at][c];
+      n += 1;
+    }
+    spread(true);
+    if (n > 0) {
+      for (auto& c : sum) c /= n;
+      const Value mean = neutral(sum);
+      for (std::size_t at = 0; at < value.size(); ++at)
+        if (!known[at] && patch[at] != kNobody) set(static_cast<int>(at), mean);
+    }
+    spread(false);
+  }
   /// Gives each known texel of `which` the mean of the known ones beside it that are of its patch and not of `which`;
   /// it keeps its value where there is none.
   void replace_by_neighbours(const std::array<bool, kSlotTexels>& which) {

@@ -1,6 +1,7 @@
 // View-dependent light: what leaves a point for one eye beyond what leaves it for all.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -169,6 +170,33 @@ TEST(ViewLight, an_eye_at_or_behind_the_point_gives_finite_light) {
       EXPECT_TRUE(std::isfinite(light.x + light.y + light.z));
       EXPECT_GE(light.x, 0);
     }
+}
+
+// A closed body whose walls are thin and rough: the ray that its front scattered comes through the far wall's back.
+TEST(FrostedBody, is_as_bright_single_sided_as_double_sided) {
+  std::array<double, 2> mean{};
+  for (const bool double_sided : {false, true}) {
+    test::HandScene hand;
+    auto frosted = test::HandScene::matte(glm::vec3(1));
+    frosted.transmission = 1;
+    frosted.roughness = 0.4f;
+    frosted.ior = 1.5f;
+    frosted.double_sided = double_sided;
+    hand.box(glm::vec3(-1), glm::vec3(1), hand.material(frosted), false);
+    hand.scene.sky = {glm::vec3(1), glm::vec3(1), glm::vec3(1)};
+    const auto scene = hand.share();
+    const LightTransport transport(scene, trace::RayScene::build(scene, 1).value());
+    trace::Ray ray;
+    ray.origin = {0.1f, 0.2f, 5};
+    constexpr int kPaths = 4096;
+    for (std::uint32_t i = 0; i < kPaths; ++i) {
+      Sampler sampler(3, 5, i);
+      mean[double_sided ? 1 : 0] += static_cast<double>(transport.full_radiance(ray, sampler).y) / kPaths;
+    }
+  }
+  // Energy is lost to lobes of one scattering alone; the bound is five standard errors (a path is at most 1 here).
+  EXPECT_GT(mean[0], 0.5);
+  EXPECT_NEAR(mean[0], mean[1], 5 * 0.5 / 64);
 }
 
 }  // namespace

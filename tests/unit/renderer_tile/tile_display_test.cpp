@@ -67,6 +67,23 @@ TEST_F(TileDisplayTest, flat_light_gives_its_flat_colour) {
   EXPECT_EQ(picture.samples, 1.0f);
 }
 
+TEST_F(TileDisplayTest, a_patch_without_light_is_grey_where_asked_for_and_else_as_what_is_beside_it) {
+  world_.world.patch = [](TileId, int x, int) { return x < 15 ? 1u : 2u; };
+  world_.world.light = [](TileId, int, std::uint32_t) { return TexelLight{glm::vec3(0), glm::vec3(0.5f, 0, 0)}; };
+  TexelMask left;
+  for (int y = 0; y < kTileSize; ++y) left.set_row(0, 14, y);
+  first_pass(middle_, left);
+  TileDisplay display(*store_, facts_, DisplayOptions{1.0f, 384});
+  const auto beside = display.draw(middle_, level_, left).value();
+  EXPECT_EQ(code(beside, 25, 10, 0), code(beside, 3, 10, 0));
+  EXPECT_EQ(code(beside, 25, 10, 1), 0);
+  const auto grey = display.draw(middle_, level_, left, Unlit::kGrey).value();
+  EXPECT_EQ(code(grey, 3, 10, 0), code(beside, 3, 10, 0));
+  EXPECT_EQ(code(grey, 25, 10, 0), code(grey, 25, 10, 1));
+  EXPECT_EQ(code(grey, 25, 10, 1), code(grey, 25, 10, 2));
+  EXPECT_GT(code(grey, 25, 10, 1), 0);
+}
+
 TEST_F(TileDisplayTest, unshaded_tile_has_no_picture) {
   TileDisplay display(*store_, facts_, {});
   EXPECT_FALSE(display.draw(middle_, level_, TexelMask::all()));

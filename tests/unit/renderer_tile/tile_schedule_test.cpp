@@ -255,16 +255,19 @@ TEST(CoarseRoundsTest, what_is_seen_comes_first_and_is_enough_for_a_picture) {
   EXPECT_TRUE(rounds.batch_finished());
 }
 
-TEST(CoarseCanvasTest, tiles_without_light_take_the_nearest_colour) {
+TEST(CoarseCanvasTest, tiles_without_light_are_as_bright_as_the_nearest_and_grey) {
   CoarseCanvas canvas(LevelTiles{3, 1}, 7);
   TileImage image{};
-  image.rgb.fill(90);
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = i % 3 == 1 ? 90 : 0;  // green
   canvas.put(2, image);
   const auto picture = canvas.finish();
   EXPECT_EQ(picture->version, 7u);
   EXPECT_EQ(picture->width, 90u);
   EXPECT_EQ(picture->height, 30u);
-  EXPECT_TRUE(std::all_of(picture->rgb.begin(), picture->rgb.end(), [](auto v) { return v == 90; }));
+  for (std::size_t i = 0; i < picture->rgb.size(); ++i) {
+    const bool put = i / 3 % 90 >= 60;
+    ASSERT_EQ(picture->rgb[i], put ? (i % 3 == 1 ? 90 : 0) : 64) << i;
+  }
 }
 
 TEST_F(TileScheduleTest, stored_tiles_are_asked_for_their_picture_once) {
