@@ -23,7 +23,7 @@ std::shared_ptr<const GeometryStream> scene() {
 
 class SessionProtocolTest : public ::testing::Test {
  protected:
-  void start(SessionPolicy policy = {}) {
+  void start(const SessionPolicy& policy = {}) {
     protocol = std::make_unique<SessionProtocol>(SessionId{3}, policy, std::string(32, 'k'), std::uint16_t{777},
                                                  scene(), std::make_shared<FrameBodies>(), 0);
   }
@@ -432,8 +432,8 @@ TEST_F(SessionProtocolTest, a_client_has_no_private_layer_where_there_is_no_memo
   SessionPolicy policy;
   policy.view_phystex = 1024;
   policy.memory = std::make_shared<SessionMemory>(private_layer_bytes(1024) + (4u << 20));
-  const auto offered = [&](SessionPolicy p, Actions* actions) {
-    start(std::move(p));
+  const auto offered = [&](const SessionPolicy& p, Actions* actions) {
+    start(p);
     auto e = hello();
     e.mutable_hello()->set_max_view_phystex(1024);
     *actions = say(e);
