@@ -45,6 +45,8 @@ SessionActor::SessionActor(runtime::Context<Inbox> context, SessionId id,
 
 SessionActor::~SessionActor() {
   finish("the session ended");
+  protocol_.reset();  // holds nothing any more
+  tell_memory();
   --*around_->live;
 }
 
@@ -57,6 +59,10 @@ void SessionActor::on_start() {
   connection_->attach(self());
   connection_->read();
   tick_later();
+}
+
+void SessionActor::tell_memory() const {
+  around_->metrics->set("darm_session_memory_bytes", double(around_->policy.memory->held()));
 }
 
 void SessionActor::act(Actions&& actions) {
@@ -140,7 +146,7 @@ void SessionActor::on(DatagramReceived&& event) {
 void SessionActor::on(Tick&&) {
   if (finished_) return;
   act(protocol_->on_tick(now_us()));
-  around_->metrics->set("darm_session_memory_bytes", double(around_->policy.memory->held()));
+  tell_memory();
   if (finished_) return;
   if (protocol_->finished(now_us())) return finish(protocol_->end());
   tick_later();

@@ -64,6 +64,8 @@ class SessionActor : public runtime::Actor<Inbox> {
   void tick_later();
   void finish(const std::string& why);
 
+  void tell_memory() const;
+
   SessionId id_;
   std::shared_ptr<SessionSurroundings> around_;
   std::shared_ptr<Connection> connection_;

@@ -10,8 +10,8 @@
 namespace darm::session {
 
 /// What a private layer of `size` pixels square holds: its encoder's pictures and references, the picture it is
-/// composed in, the tiles it was made of. An estimate: 130 clients with layers of
-/// 1024 made the process 3.2 GB larger (docs/load.md), other things of theirs included.
+/// composed in, the tiles it was made of. An estimate: a hundred clients with layers of 1024 made the process 3.4 GB
+/// larger (docs/load.md), other things of theirs included.
 [[nodiscard]] constexpr std::size_t private_layer_bytes(std::uint32_t size) {
   constexpr std::size_t kBytesPerPixel = 24;
   return kBytesPerPixel * size * size;

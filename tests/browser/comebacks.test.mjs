@@ -5,21 +5,14 @@ import {writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
-import {boxScene, browse, cutting, folder, linkOf, picture, serve, status, until} from './running.mjs';
+import {boxScene, browse, close, cutting, folder, linkOf, open, picture, serve, status, until} from './running.mjs';
 
 const state = folder();
 let daemon;
 let browser;
 
-before(async () => {
-  daemon = await serve(state.path, {more: ['--q', '32']});
-  browser = await browse();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-  state.remove();
-});
+before(async () => ({daemon, browser} = await open(state, '--q', '32')));
+after(() => close(state, daemon, browser));
 
 const small = {viewport: {width: 320, height: 180}};
 

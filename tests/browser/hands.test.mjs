@@ -4,21 +4,14 @@ import {writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 
-import {boxScene, browse, folder, lagging, picture, serve, status, until} from './running.mjs';
+import {boxScene, close, folder, lagging, open, picture, serve, status, until} from './running.mjs';
 
 const state = folder();
 let daemon;
 let browser;
 
-before(async () => {
-  daemon = await serve(state.path, {more: ['--q', '16']});
-  browser = await browse();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-  state.remove();
-});
+before(async () => ({daemon, browser} = await open(state, '--q', '16')));
+after(() => close(state, daemon, browser));
 
 const small = {viewport: {width: 320, height: 180}};
 const distance = (a, b) => Math.hypot(...a.position.map((p, i) => p - b.position[i]));

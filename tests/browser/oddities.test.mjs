@@ -2,21 +2,14 @@
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
 
-import {browse, folder, serve, status, until} from './running.mjs';
+import {close, folder, open, status, until} from './running.mjs';
 
 const state = folder();
 let daemon;
 let browser;
 
-before(async () => {
-  daemon = await serve(state.path, {more: ['--q', '16']});
-  browser = await browse();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-  state.remove();
-});
+before(async () => ({daemon, browser} = await open(state, '--q', '16')));
+after(() => close(state, daemon, browser));
 
 const small = {viewport: {width: 320, height: 180}};
 

@@ -60,6 +60,17 @@ export async function serve(state, {port = 0, config = setUp, more = []} = {}) {
   };
 }
 
+/** A daemon and a browser for all tests of a file, with a folder of their own. */
+export async function open(state, ...more) {
+  return {daemon: await serve(state.path, {more}), browser: await browse()};
+}
+
+export async function close(state, daemon, browser) {
+  await browser?.close();
+  await daemon?.stop();
+  state.remove();
+}
+
 export const status = (page) => page.evaluate(() => globalThis.darm?.status() ?? null);
 
 /** Waits until `holds(status)`; the last status. */

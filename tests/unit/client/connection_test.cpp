@@ -13,40 +13,12 @@
 #include "proto/datagram.hpp"
 #include "proto/framing.hpp"
 #include "proto/limits.hpp"
+#include "tests/unit/client/peer.hpp"
 
 namespace darm::client {
 namespace {
 
 using namespace std::chrono_literals;
-
-// One accepted connection of a server that follows a script.
-class Peer {
- public:
-  explicit Peer(int fd) : fd_(fd) {}
-  ~Peer() { ::close(fd_); }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-
-  void send(const wire::Envelope& e) { send_bytes(proto::frame(e)); }
-  void send_bytes(const std::vector<std::uint8_t>& bytes) {
-    EXPECT_EQ(::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
-  }
-  wire::Envelope read() {
-    wire::Envelope e;
-    std::uint8_t buffer[4096];
-    for (;;) {
-      const auto got = frames_.next(e);
-      if (!got || *got) return e;
-      const auto n = ::recv(fd_, buffer, sizeof(buffer), 0);
-      if (n <= 0) return {};
-      frames_.feed(std::span(buffer, static_cast<std::size_t>(n)));
-    }
-  }
-
- private:
-  int fd_;
-  proto::FrameReader frames_{1 << 20};
-};
 
 class FakeServer {
  public:

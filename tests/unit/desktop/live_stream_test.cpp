@@ -17,6 +17,7 @@
 
 #include "proto/framing.hpp"
 #include "proto/limits.hpp"
+#include "tests/unit/client/peer.hpp"
 #include "tests/unit/client/synthetic.hpp"
 
 namespace darm::client::desktop {
@@ -25,49 +26,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::uint64_t kTag = 4711;
-
-class Peer {
- public:
-  explicit Peer(int fd) : fd_(fd) {}
-  ~Peer() { ::close(fd_); }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-
-  void send(const wire::Envelope& e) {
-    const auto bytes = proto::frame(e);
-    ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-  }
-
-  /// The next message; an empty one once the client is gone.
-  wire::Envelope read() {
-    wire::Envelope e;
-    std::uint8_t buffer[4096];
-    for (;;) {
-      const auto got = frames_.next(e);
-      if (!got || *got) return e;
-      const auto n = ::recv(fd_, buffer, sizeof(buffer), 0);
-      if (n <= 0) return {};
-      frames_.feed(std::span(buffer, static_cast<std::size_t>(n)));
-    }
-  }
-
-  /// The next camera; an empty one once the client is gone.
-  wire::CameraUpdate camera() {
-    for (;;) {
-      const auto e = read();
-      if (e.body_case() == wire::Envelope::BODY_NOT_SET || e.has_camera()) return e.camera();
-    }
-  }
-
-  void hold_until_gone() {
-    while (read().body_case() != wire::Envelope::BODY_NOT_SET) {
-    }
-  }
-
- private:
-  int fd_;
-  proto::FrameReader frames_{1 << 20};
-};
 
 /// Visits 0, 1, ... are each given to the script, one after the other.
 class ScriptedServer {
