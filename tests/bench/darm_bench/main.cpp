@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 
 #include "tests/bench/darm_bench/effects.hpp"
 #include "tests/bench/darm_bench/frame_streaming.hpp"
@@ -21,6 +22,9 @@ int print(const darm::Result<nlohmann::json>& report, bool json) {
   return 0;
 }
 
+// Not in the working folder: a store is some hundred megabytes, and the next commit would have it.
+std::string bench_folder() { return (std::filesystem::temp_directory_path() / "darm-bench").string(); }
+
 void declare_time_to_quality(CLI::App& app, darm::bench::TimeToQualityOptions& o) {
   app.add_option("--scene", o.scene, "glTF file (default: the set-up's)");
   app.add_option("--config", o.config, "set-up, e.g. config/scenes/sponza.toml");
@@ -30,7 +34,7 @@ void declare_time_to_quality(CLI::App& app, darm::bench::TimeToQualityOptions& o
   app.add_option("--reference", o.references,
                  "BASE of BASE.a.pfm and BASE.b.pfm, one a camera (default: rendered once)");
   app.add_option("--state-dir", o.state_dir, "keeps layouts and references; its radiance stores are deleted")
-      ->default_val("bench-state");
+      ->default_val(bench_folder());
   app.add_option("--target", o.target_db, "dB")->capture_default_str();
   app.add_option("--seconds", o.seconds, "how long the clients watch")->capture_default_str();
   app.add_option("--truth", o.truth_seconds,
@@ -44,7 +48,7 @@ void declare_raytrace(CLI::App& app, darm::bench::RaytraceOptions& o) {
   app.add_option("--config", o.config, "set-up, e.g. config/scenes/sponza.toml");
   app.add_option("--camera", o.camera, "a camera as darmd takes it (default: where a client starts)");
   app.add_option("--state-dir", o.state_dir, "keeps layouts; its radiance stores are deleted")
-      ->default_val("bench-state");
+      ->default_val(bench_folder());
   app.add_option("--tiles", o.tiles, "tiles to shade, of those the camera sees")->capture_default_str();
   app.add_option("--q", o.q, "texels per world unit (default: the set-up's)");
   app.add_flag("--all-effects", o.all_effects, "the integrator with everything on");
