@@ -31,7 +31,7 @@ constexpr auto kGoodbyeTime = std::chrono::milliseconds(1500);
 
 session::SessionPolicy session_policy(const config::Config& config, const World& world) {
   session::SessionPolicy policy;
-  policy.view_phystex = world.view_materials ? config.stream.view_phystex : 0;
+  policy.view_phystex = world.has_view_layer() ? config.stream.view_phystex : 0;
   policy.phystex_size = config.stream.phystex;
   policy.allow_chroma_444 = config.stream.chroma_444;
   policy.allow_lossless = config.stream.allow_lossless;

@@ -86,7 +86,7 @@ struct Wiring {
 
 tile_scheduler::Peers make_peers(const Wiring& w) {
   tile_scheduler::Peers peers;
-  if (w.world.view_materials) peers.view_renderer = [ref = w.view_renderer] { return ref->get(); };
+  if (w.world.has_view_layer()) peers.view_renderer = [ref = w.view_renderer] { return ref->get(); };
   peers.renderer = [ref = w.renderer] { return ref->get(); };
   const auto streams = std::make_shared<StreamDirectory>(w.parts.sessions);
   peers.make_encoder = [&system = w.system, &metrics = *w.parts.metrics, config = w.config, scheduler = w.scheduler,
@@ -120,7 +120,7 @@ void spawn_scheduler(Wiring& w) {
 
 // Only where the scene calls for it: else there is no such actor.
 void spawn_view_renderer(const Wiring& w) {
-  if (!w.world.view_materials) return;
+  if (!w.world.has_view_layer()) return;
   renderer::ViewRendererParts parts;
   parts.surfaces = renderer::make_view_surfaces(w.world.scene, w.world.mapper, w.world.transport, w.parts.seed);
   parts.options = view_options(w.config, w.world.exposure);

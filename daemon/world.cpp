@@ -89,9 +89,8 @@ Result<World> load_world(const config::Config& config, unsigned threads) {
                                              : renderer::scene_exposure(*world.transport);
   world.mapper = std::make_shared<atlas::TexelMapper>(world.scene, world.layout);
 
-  auto view = std::make_shared<const std::vector<scene::ViewMaterial>>(scene::view_materials(*world.scene));
-  if (scene::calls_for_view_layer(*view)) world.view_materials = std::move(view);
-  spdlog::info("private layer: {}", world.view_materials ? "for sessions that can take one" : "nothing calls for it");
+  world.view_materials = std::make_shared<const std::vector<scene::ViewMaterial>>(scene::view_materials(*world.scene));
+  spdlog::info("private layer: {}", world.has_view_layer() ? "for sessions that can take one" : "nothing calls for it");
   return world;
 }
 

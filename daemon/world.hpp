@@ -26,9 +26,12 @@ struct World {
   std::shared_ptr<const atlas::TexelMapper> mapper;
   std::shared_ptr<atlas::RadianceStore> store;
   std::shared_ptr<const session::GeometryStream> geometry;
-  /// By instance: what of its light depends on the eye. Null: nothing calls for a private layer.
+  /// By instance: what of its light depends on the eye.
   std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials;
   float exposure = 1;
+
+  /// Some of that light calls for a private layer.
+  [[nodiscard]] bool has_view_layer() const { return view_materials && scene::calls_for_view_layer(*view_materials); }
 };
 
 /// Loads scene, layout (from the state directory where it is cached), rays, geometry and store; says how far it is in

@@ -191,6 +191,7 @@ void EncoderActor::publish(Job& job) {
     const bool told = error != job.command.errors.end();
     answer.error = told ? error->error : job.command.error;
     answer.resolution_error = told ? error->resolution : 0.0f;
+    answer.omitted_error = told ? error->omitted : 0.0f;
     answer.stamps.encode_started = job.started;
     answer.stamps.picture_composed = job.composed;
     answer.stamps.encoded = job.encoded;

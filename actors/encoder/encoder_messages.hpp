@@ -34,6 +34,7 @@ struct ViewError {
   SessionId session{};
   float error = 0;
   float resolution = 0;  ///< ViewAnswer::resolution_error
+  float omitted = 0;     ///< ViewAnswer::omitted_error
 };
 
 /// Make one frame. At most one per stream is under way: the scheduler waits for FrameDone.

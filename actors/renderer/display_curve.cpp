@@ -50,6 +50,17 @@ std::uint8_t srgb_code(float linear) {
   return code;
 }
 
+float srgb(float linear) {
+  if (!(linear > 0.0f)) return 0;
+  if (linear >= 1.0f) return 1;
+  const auto code = static_cast<std::size_t>(srgb_code(linear));
+  const float below = code == 0 ? 0.0f : static_cast<float>(code) - 0.5f;
+  const float above = code == 255 ? 255.0f : static_cast<float>(code) + 0.5f;
+  const float from = kTables.from[code];
+  const float to = code == 255 ? 1.0f : kTables.from[code + 1];
+  return (below + (above - below) * (linear - from) / (to - from)) * (1.0f / 255.0f);
+}
+
 float srgb_slope(std::uint8_t code) { return kTables.slope[code]; }
 
 void convert_to_planes(TileImage& image) {

@@ -11,6 +11,9 @@ namespace darm::renderer {
 /// 0. No pow: a look-up and one comparison.
 [[nodiscard]] std::uint8_t srgb_code(float linear);
 
+/// sRGB(clamp(x, 0, 1)), 0..1, within 5e-5; NaN gives 0. Monotone, and without pow: straight between codes.
+[[nodiscard]] float srgb(float linear);
+
 /// Slope of the sRGB curve (display units 0..1 per linear unit) around a code; 0 at code 255, where display is clamped.
 [[nodiscard]] float srgb_slope(std::uint8_t code);
 

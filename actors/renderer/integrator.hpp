@@ -30,6 +30,9 @@ struct ViewDependentLight {
   float diffuse_factor = 1;  ///< what the diffuse part of view_independent() is multiplied with for this eye
   float ggx_alpha = 1;       ///< of the lobes
   float distance = 0;        ///< to the eye, metres
+  /// Luminance, nits, of what leaves the point whatever the eye, as far as stored light knows it: what the radiance is
+  /// seen on top of.
+  float beneath = 0;
 };
 
 /// Switches of the estimator. None changes the expectation, except for a `max_bounces` that cuts paths short.

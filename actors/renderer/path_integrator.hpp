@@ -120,6 +120,7 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
     made.ggx_alpha = m.ggx_alpha;
     if (m.unlit) return made;
     if (m.interface) made.diffuse_factor = diffuse_view_factor(std::max(glm::dot(wo, s.normal), 0.0f));
+    made.beneath = known_light(s, m, stored);
     if (fx.straight && !m.thin && m.passes_straight()) {
       const glm::vec3 light = full_radiance({trace::spawn_origin(s, wo), 0.0f, -wo, 1e30f}, sampler);
       made.radiance = detail::finite_or_black(light - m.emission);
@@ -167,6 +168,14 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
   [[nodiscard]] bool takes_diffuse_light(const SurfacePoint& point) const {
     const auto& material = *rays_.instance(point.instance).material;
     return !detail::sees_black(material, point.front) && may_diffuse(material);
+  }
+
+  /// Luminance of light that does not depend on the eye, where `stored` knows it; else 0.
+  [[nodiscard]] static float known_light(const trace::Surface& s, const auto& m, const StoredLight* stored) {
+    const auto* texel = stored != nullptr ? stored->find(s, glm::vec2(0.5f)) : nullptr;
+    if (texel == nullptr) return 0.0f;
+    const float light = luminance(m.diffuse_albedo() * (texel->sharp + texel->soft) + m.emission);
+    return std::isfinite(light) ? light : 0.0f;
   }
 
   /// Suns and lamps at a first vertex.

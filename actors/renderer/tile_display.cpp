@@ -15,13 +15,26 @@ using atlas::Plane;
 
 namespace {
 
-// A pixel reads about five texels of its level, of equal weight: the level is chosen so that the pixel is 1 to 2 texels
-// wide along its lesser axis and often more along the other, and each of its 2x2 samples is bilinear.
-constexpr float kPixelTexels = 5;
-
 // What is left of a texel's variance in the mean that a pixel shows, if the errors of `texels` around it are the same:
 // the areas of two averages, one after the other, add.
 float left_in_pixel(float texels) { return texels / (texels + kPixelTexels - 1); }
+
+// Squared display error, mean over the channels, of a linear colour whose luminance has this squared error and whose
+// hue is right: of two values as far to either side of it. What is over white is not seen.
+double display_square(const std::array<float, 3>& linear, float squared) {
+  if (!(squared > 0)) return 0;
+  const float grey = luminance(glm::vec3(linear[0], linear[1], linear[2]));
+  const float spread = grey > 0 ? std::sqrt(squared) / grey : 0.0f;
+  double sum = 0;
+  for (const float value : linear) {
+    const float off = grey > 0 ? value * spread : std::sqrt(squared);
+    const float middle = srgb(value);
+    const float above = srgb(value + off) - middle;
+    const float below = srgb(std::max(value - off, 0.0f)) - middle;
+    sum += 0.5 * (double{above} * double{above} + double{below} * double{below});
+  }
+  return std::min(sum / 3, 0.25);
+}
 
 constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
 
@@ -40,8 +53,8 @@ Step step_of(int coordinate) {
 
 struct SlotColours {
   SlotFill<3> fill;
-  std::array<float, kSlotTexels> variance{};  // of the reflected light's luminance in a pixel
-  std::array<float, kSlotTexels> smear{};     // its other square error, as FilteredTexel has it
+  std::array<float, kSlotTexels> variance{};  // of the reflected light's luminance in a pixel, exposed
+  std::array<float, kSlotTexels> smear{};     // its other square error, as FilteredTexel has it, likewise
   std::array<bool, kSlotTexels> lightless{};
 };
 
@@ -151,7 +164,7 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, SlotColours& co
       add_guess(lit, id, patch, first + glm::vec2(x, y));
       if (!lit.has_sharp || !lit.has_soft) continue;  // filled from those that have it
       const glm::vec3 albedo = from.facts->albedo(texel);
-      const float grey = luminance(albedo);
+      const float grey = luminance(albedo) * options_.exposure;
       colours.variance[at] =
           grey * grey *
           (lit.soft.variance * left_in_pixel(lit.soft.texels) + lit.sharp.variance * left_in_pixel(lit.sharp.texels));
@@ -164,7 +177,7 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, SlotColours& co
   }
 }
 
-float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const SlotColours& colours,
+float TileDisplay::error_of(const TexelMask& mask, const SlotColours& colours,
                             const std::array<bool, kSlotTexels>& known, float& samples) const {
   double squares = 0;
   double smear = 0;
@@ -180,11 +193,9 @@ float TileDisplay::error_of(const TileImage& image, const TexelMask& mask, const
       squares += 0.25 * 0.25;  // filled from neighbours: nothing is known of it
       continue;
     }
-    const std::uint8_t* rgb = &image.rgb[at * 3];
-    const auto code = static_cast<std::uint8_t>(std::lround(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]));
-    const double shown = double{srgb_slope(code)} * double{options_.exposure};
-    squares += std::min(shown * shown * double{std::max(colours.variance[at], 0.0f)}, 0.25);
-    smear += std::clamp(shown * shown * double{colours.smear[at]}, -0.25, 0.25);
+    const auto& shown = colours.fill.value[at];
+    squares += display_square(shown, colours.variance[at]);
+    smear += std::copysign(display_square(shown, std::abs(colours.smear[at])), double{colours.smear[at]});
   }
   if (texels == 0) return samples = 0;
   samples = static_cast<float>(count / texels);
@@ -220,7 +231,7 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   if (around_[4].facts) image->coverage = around_[4].facts->coverage;
 
   TilePicture picture;
-  picture.error = error_of(*image, mask, colours, known, picture.samples);
+  picture.error = error_of(mask, colours, known, picture.samples);
   picture.image = std::move(image);
   return picture;
 }

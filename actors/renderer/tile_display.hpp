@@ -19,6 +19,10 @@ struct DisplayOptions {
   float filter_samples = 384;  ///< effective samples the filter gathers; 0 turns it off
 };
 
+/// A pixel reads about five texels of its level, of equal weight: the level is chosen so that the pixel is 1 to 2
+/// texels wide along its lesser axis and often more along the other, and each of its 2x2 samples is bilinear.
+inline constexpr float kPixelTexels = 5;
+
 struct TilePicture {
   std::shared_ptr<const TileImage> image;
   /// RMS over the mask's texels of the display-space error expected, 0..1, of a pixel that reads about five of them:
@@ -71,7 +75,7 @@ class TileDisplay {
   [[nodiscard]] static Lit light_of(const Neighbour& from, int texel, const FilteredTexel& filtered);
   void add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm::vec2& at) const;
   void shade_slot(TileId id, const LevelTiles& level, struct SlotColours& colours);
-  [[nodiscard]] float error_of(const TileImage& image, const TexelMask& mask, const struct SlotColours& colours,
+  [[nodiscard]] float error_of(const TexelMask& mask, const struct SlotColours& colours,
                                const std::array<bool, kSlotTexels>& known, float& samples) const;
 
   const atlas::RadianceStore& store_;

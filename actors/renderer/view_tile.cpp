@@ -44,9 +44,9 @@ void ViewTile::survey() {
   display_variance_ = live_ > 0 ? static_cast<float>(variance / live_) : 1.0f;
 }
 
-// Of one sample, in display values. What lies under it in the shared layer is not known here: a little.
+// Of one sample, in display values: on top of what is known of the shared layer there, and at least a little.
 float ViewTile::variance_of(const Texel& texel) const {
-  const float linear = std::max(luminance(texel.mean) * exposure_, 0.0f) + kPedestal;
+  const float linear = std::max(luminance(texel.mean) + texel.beneath, 0.0f) * exposure_ + kPedestal;
   const float slope = srgb_slope(srgb_code(linear)) * exposure_;
   return texel.m2 / std::max(texel.count - 1.0f, 1.0f) * slope * slope;
 }
@@ -83,6 +83,7 @@ void ViewTile::add(Texel& texel, const ViewDependentLight& light) {
   if (light.distance > 0) distance_ = distance_ > 0 ? std::min(distance_, light.distance) : light.distance;
   texel.count += 1;
   texel.shown = true;
+  texel.beneath = light.beneath;
   if (texel.count <= 1) {
     texel.mean = light.radiance;
     texel.m2 = 0;
@@ -147,22 +148,35 @@ int ViewTile::filter_radius() const {
   return mean_ < 64 ? 2 : mean_ < 256 ? 1 : 0;
 }
 
-// Of the mean, in display values: RMS over the wanted texels. Noise only.
-float ViewTile::standard_error() const {
-  double squares = 0;
+// RMS over the wanted texels, in display values, of what a pixel shows that reads about five of them: noise of the mean
+// over the filter's square, and what that smears: by how much more than their noise the texels differ from what is
+// shown instead. `light`: nits; `shown`: the same filtered, exposed.
+float ViewTile::error_of(const std::vector<glm::vec3>& light, const std::vector<glm::vec3>& shown) const {
+  const auto side = static_cast<double>(2 * filter_radius() + 1);
+  const double gathered = side * side;
+  double noise = 0, smear = 0;
   int texels = 0;
   for (int at = 0; at < kSlotTexels; ++at) {
     if (!mask_.test(at) || dead_.test(at)) continue;
     const auto& t = texels_[static_cast<std::size_t>(at)];
     ++texels;
-    squares += t.count < 2 ? 0.0625 : std::min(double{variance_of(t)} / double{t.count}, 0.25);
+    const auto display = [&](const glm::vec3& v) { return double{srgb(luminance(v) + t.beneath * exposure_)}; };
+    const auto i = static_cast<std::size_t>(at);
+    const double sample = display(light[i] * exposure_);
+    // One sample tells nothing of its error: as much as it brings.
+    const double guess = sample - display(glm::vec3(0.0f));
+    const double own = t.count < 2 ? guess * guess : std::min(double{variance_of(t)} / double{t.count}, 0.25);
+    noise += own / (gathered + kPixelTexels - 1);
+    const double apart = sample - display(shown[i]);
+    smear += t.count < 2 ? 0.0 : apart * apart - own * (1 - 1 / gathered);
   }
-  return texels > 0 ? static_cast<float>(std::sqrt(squares / texels)) : 0.0f;
+  return texels > 0 ? static_cast<float>(std::sqrt((noise + std::max(smear, 0.0)) / texels)) : 0.0f;
 }
 
 TilePicture ViewTile::draw(ViewSurface& surface) {
   SlotFill<3> fill;
   std::vector<glm::vec3> light(kSlotTexels, glm::vec3(0.0f));
+  std::vector<glm::vec3> filtered(kSlotTexels, glm::vec3(0.0f));
   for (int at = 0; at < kSlotTexels; ++at) {
     fill.patch[static_cast<std::size_t>(at)] = surface.patch(at);
     const auto& texel = texels_[static_cast<std::size_t>(at)];
@@ -185,6 +199,7 @@ TilePicture ViewTile::draw(ViewSurface& surface) {
         weight += w;
       }
     const glm::vec3 shown = sum * (exposure_ / std::max(weight, 1e-6f));
+    filtered[static_cast<std::size_t>(at)] = shown;
     fill.set(at, {shown.x, shown.y, shown.z});
   }
   // Other patches in the tile may have nothing private: filled across, they would get light that is not theirs.
@@ -197,7 +212,7 @@ TilePicture ViewTile::draw(ViewSurface& surface) {
   through_known_ = true;
   image->through = through_;
   TilePicture picture;
-  picture.error = error_ = standard_error();
+  picture.error = error_ = error_of(light, filtered);
   picture.samples = pictured_ = mean_;
   picture.image = std::move(image);
   return picture;

@@ -21,7 +21,7 @@ struct ViewTileOptions {
   float least_turn = 2e-4f;  ///< radians under which the eye counts as at rest: a tenth of a pixel
 };
 
-/// 28 KB. One thread at a time.
+/// 32 KB. One thread at a time.
 class ViewTile {
  public:
   explicit ViewTile(float exposure) : texels_(kSlotTexels), exposure_(exposure) {}
@@ -52,8 +52,9 @@ class ViewTile {
  private:
   struct Texel {
     glm::vec3 mean{0.0f};
-    float m2 = 0;     // of luminance
-    float count = 0;  // 0: the mean is that of an eye before, or nothing
+    float m2 = 0;       // of luminance
+    float beneath = 0;  // what it is seen on top of, nits
+    float count = 0;    // 0: the mean is that of an eye before, or nothing
     std::uint32_t drawn = 0;
     bool shown = false;  // the mean is something
   };
@@ -62,7 +63,7 @@ class ViewTile {
   [[nodiscard]] float variance_of(const Texel& texel) const;
   [[nodiscard]] glm::vec3 tamed(int at) const;
   [[nodiscard]] int filter_radius() const;
-  [[nodiscard]] float standard_error() const;
+  [[nodiscard]] float error_of(const std::vector<glm::vec3>& light, const std::vector<glm::vec3>& shown) const;
 
   std::vector<Texel> texels_;
   SlotMask mask_;

@@ -8,7 +8,6 @@
 namespace darm::scene {
 namespace {
 
-constexpr float kGrey = 0.3f;   // linear radiance around, exposed
 constexpr float kRough = 0.6f;  // from here on a dielectric's coat shows no more than a brightness
 constexpr std::uint32_t kGrid = 32;
 constexpr float kSharpest = 0.1f;  // share of the points whose roughness decides
@@ -28,6 +27,8 @@ glm::vec4 texel(const Scene& scene, const TextureRef& texture, std::uint32_t x, 
 
 struct Point {
   float weight = 0;
+  float omitted = 0;
+  float diffuse = 0;
   float call = 0;
   float roughness = 1;
 };
@@ -52,8 +53,9 @@ Point point_of(const Scene& scene, const Material& m, std::uint32_t x, std::uint
   const float view = metallic * base + dielectric * fresnel + through;
   const float smooth = std::clamp(1.0f - roughness, 0.0f, 1.0f);
   const float contrast = 1.0f + 2.0f * smooth * smooth;
-  const auto shown = [&](float light) { return contrast * (srgb(kGrey * (diffuse + light)) - srgb(kGrey * diffuse)); };
-  return {shown(view), shown(needed), roughness};
+  constexpr float kGrey = kGreySurroundings;
+  const auto shown = [&](float light) { return srgb(kGrey * (diffuse + light)) - srgb(kGrey * diffuse); };
+  return {contrast * shown(view), shown(view), diffuse, contrast * shown(needed), roughness};
 }
 
 // A lobe of roughness r is about r^2 radians wide, and what it reflects changes over about so many pixels.
@@ -74,15 +76,21 @@ ViewMaterial view_material(const Scene& scene, const Material& m) {
   std::vector<float> roughness;
   double squares = 0;
   double calls = 0;
+  double omitted = 0;
+  double diffuse = 0;
   for (std::uint32_t y = 0; y < grid; ++y)
     for (std::uint32_t x = 0; x < grid; ++x) {
       const Point p = point_of(scene, m, x, y);
       squares += double{p.weight} * p.weight;
       calls += double{p.call} * p.call;
+      omitted += double{p.omitted} * p.omitted;
+      diffuse += double{p.diffuse};
       roughness.push_back(p.roughness);
     }
   const auto points = static_cast<double>(roughness.size());
+  out.omitted = std::min(1.0f, static_cast<float>(std::sqrt(omitted / points)));
   out.weight = std::min(1.0f, static_cast<float>(std::sqrt(squares / points)));
+  out.diffuse = static_cast<float>(diffuse / points);
   out.call = std::min(1.0f, static_cast<float>(std::sqrt(calls / points)));
   const auto sharp = roughness.begin() + static_cast<std::ptrdiff_t>(kSharpest * static_cast<float>(roughness.size()));
   std::nth_element(roughness.begin(), sharp, roughness.end());
@@ -119,7 +127,7 @@ std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialO
   }
   const float least = most >= options.calls ? options.joins : 2.0f;
   for (auto& m : out)
-    if (m.weight < least) m = {};
+    if (m.weight < least) m = {.omitted = m.omitted, .diffuse = m.diffuse};
   return out;
 }
 

@@ -16,6 +16,9 @@ struct ViewMaterial {
   float call = 0;
   /// Levels under the sharp one at which its light is kept: what a rough lobe reflects is smooth.
   std::uint8_t coarser = 0;
+  /// Of leaving it out of a picture among kGreySurroundings, whether or not there is a private layer.
+  float omitted = 0;
+  float diffuse = 0;  ///< mean luminance of its diffuse albedo, 0..1
 };
 
 struct ViewMaterialOptions {
@@ -24,14 +27,17 @@ struct ViewMaterialOptions {
 };
 
 /// Reads a material and a grid of points of its textures. The weight of a point: what a grey surrounding of display
-/// value about .6 (linear 0.3) would add to its diffuse light, as a difference of display values, times 1 to 3 for
-/// lobes so narrow that they show what they reflect. Of the material: RMS over the points.
+/// value about .6 (kGreySurroundings) would add to its diffuse light, as a difference of display values, times 1 to 3
+/// for lobes so narrow that they show what they reflect. Of the material: RMS over the points.
 [[nodiscard]] ViewMaterial view_material(const Scene& scene, const Material& material);
 
 /// What a thin clear surface passes of what is straight behind it, as a mean over a grid of points of its textures:
 /// linear base colour * transmission * (1 - metallic), 0..1 a channel. Black where nothing comes through straight: no
 /// transmission, or a volume, which refracts.
 [[nodiscard]] glm::vec3 mean_passage(const Scene& scene, const Material& material);
+
+/// The grey that `omitted` is meant for: linear radiance from everywhere, exposed.
+inline constexpr float kGreySurroundings = 0.3f;
 
 /// One per instance. All weights are 0 if nothing in the scene calls for a private layer.
 [[nodiscard]] std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialOptions& options = {});

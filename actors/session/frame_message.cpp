@@ -70,6 +70,7 @@ Packet frame_packet(FrameBodies& bodies, const std::shared_ptr<const EncodedFram
   own.set_answers(answer.sequence);
   own.set_error(answer.error);
   own.set_resolution_error(answer.resolution_error);
+  own.set_omitted_error(answer.omitted_error);
   put_stamps(answer.stamps, *own.mutable_stamps());
   packet.tail.resize(own.ByteSizeLong());
   own.SerializeWithCachedSizesToArray(packet.tail.data());
@@ -92,6 +93,7 @@ wire::Envelope no_change_message(const NoChange& event) {
   m->set_answers(event.answer.sequence);
   m->set_error(event.error);
   m->set_resolution_error(event.answer.resolution_error);
+  m->set_omitted_error(event.answer.omitted_error);
   put_stamps(event.answer.stamps, *m->mutable_stamps());
   return envelope;
 }

@@ -6,28 +6,29 @@
 namespace darm::tile_scheduler {
 namespace {
 
-// Chains of both poses, each once, with their worth as a share of the picture, and that share itself.
-std::vector<WeightedChain> join(const PrivateSet& current, const PrivateSet& previous, float previous_weight,
-                                std::vector<float>& shares) {
-  std::vector<WeightedChain> out;
+// Chains of both poses, each once, with their worth as a share of the picture.
+struct Joined {
+  std::vector<WeightedChain> chains;
+  std::vector<float> shares;   // of the picture, parallel
+  std::vector<float> squares;  // of errors of lacking it, times that
   ChainIndex seen;
-  const auto append = [&](const PrivateSet& set, float weight) {
+
+  void append(const PrivateSet& set, float weight) {
     if (set.samples() <= 0) return;
     const auto per_sample = static_cast<float>(double{weight} / set.samples());
     for (std::size_t i = 0; i < set.chains().size(); ++i) {
       const auto number = seen.insert(set.chains()[i]);
-      if (number == out.size()) {
-        out.push_back({set.chains()[i], 0.0f});
+      if (number == chains.size()) {
+        chains.push_back({set.chains()[i], 0.0f});
         shares.push_back(0.0f);
+        squares.push_back(0.0f);
       }
-      out[number].weight += set.worths()[i] * per_sample;
+      chains[number].weight += set.worths()[i] * per_sample;
       shares[number] += set.counts()[i] * per_sample;
+      squares[number] += set.squares()[i] * per_sample;
     }
-  };
-  append(current, 1.0f);
-  append(previous, previous_weight);
-  return out;
-}
+  }
+};
 
 }  // namespace
 
@@ -54,8 +55,13 @@ bool PrivateLayer::expire(Microseconds now) {
 void PrivateLayer::reallocate(const AllocationOptions& options, int coarse_level) {
   allocation_ = options;
   coarse_level_ = coarse_level;
-  chain_shares_.clear();
-  chains_ = join(current_, previous_, options_.previous_weight, chain_shares_);
+  Joined joined;
+  joined.append(current_, 1.0f);
+  joined.append(previous_, options_.previous_weight);
+  chains_ = std::move(joined.chains);
+  chain_shares_ = std::move(joined.shares);
+  chain_squares_ = std::move(joined.squares);
+  share_sum_ = 1.0 + (previous_.samples() > 0 ? double{options_.previous_weight} : 0.0);
   losses_.assign(chains_.size(), options_.loss);
   target_ = allocate(nullptr);
   const auto share = shares();
@@ -107,10 +113,23 @@ void PrivateLayer::grant() {
     return image != nullptr && image->image != nullptr;
   };
   if (std::all_of(target_.tiles.begin(), target_.tiles.end(), has)) {
-    granted_ = target_.tiles;
+    granted_ = target_;
     return;
   }
-  granted_ = allocate(has).tiles;
+  granted_ = allocate(has);
+}
+
+double PrivateLayer::squared_error(float shown) const {
+  double sum = 0;
+  for (std::size_t c = 0; c < chains_.size() && c < granted_.served.size(); ++c) {
+    const auto position = granted_.served[c];
+    const auto* stored = position < kChainLength ? images_.find(chains_[c].chain.tiles[position]) : nullptr;
+    const double lost =
+        double{options_.loss[stored != nullptr ? position : std::size_t{kServedByCoarse}]} * double{shown};
+    const double noise = stored != nullptr ? double{stored->error} : 0.0;
+    sum += double{chain_squares_[c]} * lost * lost + double{chain_shares_[c]} * noise * noise;
+  }
+  return sum / share_sum_;
 }
 
 void PrivateLayer::put(const std::vector<ShadedTile>& tiles) {
@@ -123,7 +142,7 @@ void PrivateLayer::put(const std::vector<ShadedTile>& tiles) {
 }
 
 StreamStep PrivateLayer::step(Microseconds now, Microseconds least_interval) {
-  return stream_.step(granted_, [this](TileId tile) { return images_.find(tile); }, 0.0f, now, least_interval);
+  return stream_.step(granted_.tiles, [this](TileId tile) { return images_.find(tile); }, 0.0f, now, least_interval);
 }
 
 }  // namespace darm::tile_scheduler

@@ -39,11 +39,15 @@ class PrivateLayer {
   void put(const std::vector<ShadedTile>& tiles);
 
   /// Nothing to send and nothing sent yet: no need of an encoder.
-  [[nodiscard]] bool idle() const { return stream_.last_frame() == 0 && granted_.empty(); }
+  [[nodiscard]] bool idle() const { return stream_.last_frame() == 0 && granted_.tiles.empty(); }
   [[nodiscard]] StreamState& stream() { return stream_; }
   [[nodiscard]] const StreamState& stream() const { return stream_; }
   [[nodiscard]] StreamStep step(Microseconds now, Microseconds least_interval = 0);
   [[nodiscard]] std::size_t target_size() const { return target_.tiles.size(); }
+  /// Mean over the samples of a picture (those of the sky, too) of the squared display error that is left: of the
+  /// pictures of granted tiles, of their coarseness, and of what has none. As tiles were chosen last; 0 before that.
+  /// `shown`: what to multiply errors of ViewMaterial::omitted with (view_tone.hpp).
+  [[nodiscard]] double squared_error(float shown) const;
 
  private:
   [[nodiscard]] Allocation allocate(const std::function<bool(TileId)>& available) const;
@@ -60,9 +64,11 @@ class PrivateLayer {
   int coarse_level_ = 0;
   std::vector<WeightedChain> chains_;  // weights: worth as a share of the picture
   std::vector<float> chain_shares_;    // share of the picture, parallel
+  std::vector<float> chain_squares_;   // squared error of lacking it, times that share
   std::vector<ChainLoss> losses_;
   Allocation target_;
-  std::vector<TileId> granted_;
+  Allocation granted_;
+  double share_sum_ = 1;  // of the poses whose samples the shares are of
   std::shared_ptr<const std::vector<renderer::ViewTileRequest>> requests_;
 };
 

@@ -53,10 +53,10 @@ void PrivateSet::add(const atlas::Layout& layout, const SurfaceSample& sample, c
     const glm::vec2 corner = glm::vec2(tile.index() % level.tiles_x, tile.index() / level.tiles_x) * float{kTileSize};
     mark(*mask, texel - corner + 1.0f, glm::min(reach, glm::vec2(kMostReach)));
   }
-  count(chain, material.weight, 1.0f);
+  count(chain, material.weight, material.omitted * material.omitted, 1.0f);
 }
 
-void PrivateSet::count(const Chain& chain, float worth, float samples) {
+void PrivateSet::count(const Chain& chain, float worth, float square, float samples) {
   if (chains_.size() >= kMaxChains && chains_.find(chain) == ChainIndex::kAbsent) {
     ++left_out_;
     return;
@@ -64,14 +64,17 @@ void PrivateSet::count(const Chain& chain, float worth, float samples) {
   const auto number = chains_.insert(chain);
   if (number == worths_.size()) {
     worths_.push_back(0.0f);
+    squares_.push_back(0.0f);
     counts_.push_back(0.0f);
   }
   worths_[number] += worth;
+  squares_[number] += square;
   counts_[number] += samples;
 }
 
 void PrivateSet::merge(const PrivateSet& other) {
-  for (std::size_t i = 0; i < other.chains().size(); ++i) count(other.chains()[i], other.worths_[i], other.counts_[i]);
+  for (std::size_t i = 0; i < other.chains().size(); ++i)
+    count(other.chains()[i], other.worths_[i], other.squares_[i], other.counts_[i]);
   for (std::size_t i = 0; i < other.tiles_.size(); ++i)
     if (auto* mine = mask_of(other.tiles_.keys()[i])) *mine |= other.masks_[i];
   samples_ += other.samples_;

@@ -33,6 +33,8 @@ class PrivateSet {
   [[nodiscard]] double samples() const { return samples_; }
   [[nodiscard]] const std::vector<Chain>& chains() const { return chains_.keys(); }
   [[nodiscard]] std::span<const float> worths() const { return worths_; }  ///< sums of weights, parallel to chains()
+  /// Sums of ViewMaterial::omitted, squared; parallel to chains().
+  [[nodiscard]] std::span<const float> squares() const { return squares_; }
   [[nodiscard]] std::span<const float> counts() const { return counts_; }  ///< samples, parallel to chains()
   /// Texels read of a tile, at whatever level it serves; null if none.
   [[nodiscard]] const SlotMask* find(TileId tile) const;
@@ -40,10 +42,11 @@ class PrivateSet {
 
  private:
   SlotMask* mask_of(TileId tile);
-  void count(const Chain& chain, float worth, float samples);
+  void count(const Chain& chain, float worth, float square, float samples);
 
   ChainIndex chains_;
   std::vector<float> worths_;
+  std::vector<float> squares_;
   std::vector<float> counts_;
   TileIndex tiles_;
   std::vector<SlotMask> masks_;

@@ -23,7 +23,7 @@ TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> c
                                        std::shared_ptr<const renderer::trace::RayScene> rays,
                                        std::shared_ptr<const Peers> peers, SchedulerOptions options,
                                        runtime::MetricSink& metrics,
-                                       std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials)
+                                       std::shared_ptr<const std::vector<scene::ViewMaterial>> materials)
     : Actor(std::move(context)),
       layout_(std::move(layout)),
       rays_(std::move(rays)),
@@ -37,8 +37,8 @@ TileSchedulerActor::TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> c
       view_pace_(options.coding_views * executor().workers(), kLongestViewPause),
       images_(options.image_bytes),
       groups_(options.groups, [this] { return StreamId{next_stream_++}; }) {
-  const bool fits = view_materials && view_materials->size() == layout_->instances.size();
-  if (fits && peers_->view_renderer && scene::calls_for_view_layer(*view_materials)) view_materials_ = view_materials;
+  if (materials && materials->size() == layout_->instances.size()) materials_ = std::move(materials);
+  view_layers_ = materials_ && peers_->view_renderer && scene::calls_for_view_layer(*materials_);
   options_.passes_moving = std::clamp(options_.passes_moving, 1, kAllPasses);
   options_.passes_still = std::clamp(options_.passes_still, 1, kAllPasses);
 }
@@ -63,7 +63,8 @@ void TileSchedulerActor::on(SessionOpened&& message) {
   auto session = std::make_unique<Session>(message.format, options_);
   session->id = message.session;
   session->target_error = message.target_error;
-  if (view_materials_ && message.format.view_phystex > 0) open_view(*session);
+  session->told.session = session->id;
+  if (view_layers_ && message.format.view_phystex > 0) open_view(*session);
   sessions_.emplace(message.session, std::move(session));
 }
 
@@ -221,23 +222,6 @@ void TileSchedulerActor::send_work() {
 void TileSchedulerActor::send_work_soon() {
   work_changed_ = true;
   if (now_us() >= work_after_) send_work();
-}
-
-// One observation a view and update: quantiles over views, and the worst of now.
-void TileSchedulerActor::record_errors() {
-  double worst = 0;
-  std::size_t done = 0, slow = 0;
-  for (const auto& [id, session] : sessions_) {
-    slow += session->format.lane > 0 ? 1 : 0;
-    if (!session->posed) continue;
-    metrics_.observe("darm_view_error", double(session->error));
-    metrics_.observe("darm_view_resolution_error", double(session->resolution_error));
-    worst = std::max(worst, double(session->error));
-    done += session->error <= session->target_error ? 1 : 0;
-  }
-  metrics_.set("darm_view_error_worst", worst);
-  metrics_.set("darm_views_on_target", double(done));
-  metrics_.set("darm_sessions_slow", double(slow));
 }
 
 }  // namespace darm::tile_scheduler

@@ -100,11 +100,11 @@ struct Peers {
 class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
  public:
   /// `rays` must have been built from the scene that `layout` describes. `metrics` must outlive the actor.
-  /// `view_materials`, by instance: without them, or where none has weight, no session has a private layer.
+  /// `materials`, by instance: without them, or where none has weight, no session has a private layer.
   TileSchedulerActor(runtime::Context<tile_scheduler::Inbox> context, std::shared_ptr<const atlas::Layout> layout,
                      std::shared_ptr<const renderer::trace::RayScene> rays, std::shared_ptr<const Peers> peers,
                      SchedulerOptions options, runtime::MetricSink& metrics = runtime::null_metrics(),
-                     std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials = nullptr);
+                     std::shared_ptr<const std::vector<scene::ViewMaterial>> materials = nullptr);
 
   void on_start() override;
   void on(SessionOpened&& message);
@@ -126,8 +126,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     SessionId id{};
     StreamFormat format;
     float target_error = 0;
-    float error = 1;             // estimated, of the view's light as it was shown last
-    float resolution_error = 0;  // beside it, for want of finer texels than the atlas has
+    float light_error = 1;           // estimated, of the shared light that its view has
+    encoder::ViewError told{{}, 1};  // with that of its private layer, and what stands beside
     std::optional<Microseconds> error_at;
     Stream* stream = nullptr;  // from its first look on
     bool awaits_key = false;   // it came to the stream after that's last key frame
@@ -196,6 +196,12 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void update(Session& session);
   void send_work();
   void send_work_soon();
+
+  // What views are told of their errors.
+  void estimate_errors(Stream& stream);
+  void estimate_error(const Stream& stream, Session& session) const;
+  [[nodiscard]] static float light_error(const Stream& stream);
+  void tell_no_change(const ViewAnswer& answer);
   void record_errors();
 
   // Looks.
@@ -239,8 +245,6 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void admit(Stream& stream, Microseconds now);
   void compose(Stream& stream);
   void answer_meanwhile(Stream& stream);
-  void tell_no_change(const ViewAnswer& answer);
-  [[nodiscard]] std::vector<encoder::ViewError> errors_of(const Stream& stream);
   void send_frame(Stream& stream, encoder::ComposeFrame frame);
 
   // Private layers.
@@ -263,7 +267,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   std::shared_ptr<const Peers> peers_;
   SchedulerOptions options_;
   runtime::MetricSink& metrics_;
-  std::shared_ptr<const std::vector<scene::ViewMaterial>> view_materials_;  // null: nothing private
+  std::shared_ptr<const std::vector<scene::ViewMaterial>> materials_;  // by instance; null: not known
+  bool view_layers_ = false;                                           // there is something for private layers
   Microseconds period_;
   double near_;  // options_.near, in metres
   TraceBudget looking_;

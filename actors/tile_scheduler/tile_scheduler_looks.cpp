@@ -169,7 +169,7 @@ std::shared_ptr<ViewJob> TileSchedulerActor::make_job(Session& session, bool mov
   // What a view sees of its own while it moves, it sees when that can be made use of; all of it when it rests.
   const bool own = session.view_layer && (!moved || view_due(session));
   return std::make_shared<ViewJob>(next_job_++, layout_, rays_, session.view->camera, session.view->viewport, done,
-                                   count, slices, own ? view_materials_ : nullptr, rays);
+                                   count, slices, materials_, own, rays);
 }
 
 void TileSchedulerActor::post_slices(const std::shared_ptr<ViewJob>& job) {

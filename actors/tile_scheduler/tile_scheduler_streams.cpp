@@ -9,7 +9,6 @@
 namespace darm::tile_scheduler {
 namespace {
 
-constexpr Microseconds kErrorEvery = 30'000;
 constexpr double kLongestUnchosenUs = 1e6;
 // Weight of the newest key frame: one that has no tiles yet says little.
 constexpr double kLearnedOfLarger = 0.5;
@@ -275,15 +274,13 @@ void TileSchedulerActor::compose(Stream& stream) {
     if (!member->answer || member->awaits_key || member->unchosen) continue;
     stream.state.view_ready(*std::exchange(member->answer, std::nullopt));
   }
-  auto errors = errors_of(stream);
-  double squares = 0;
-  for (const auto& e : errors) squares += double(e.error) * double(e.error);
-  const auto error = static_cast<float>(std::sqrt(squares / double(std::max<std::size_t>(1, errors.size()))));
-  auto step = stream.state.step(stream.demand.granted.tiles, images(), error, started, frame_interval(stream, moving));
+  estimate_errors(stream);
+  auto step = stream.state.step(stream.demand.granted.tiles, images(), light_error(stream), started,
+                                frame_interval(stream, moving));
   for (const auto& answer : step.no_change) tell_no_change(answer);
   note_slots(stream, step);
   if (step.frame) {
-    step.frame->errors = std::move(errors);
+    for (const auto* member : stream.members) step.frame->errors.push_back(member->told);
     step.frame->most_bytes = most_bytes(stream, step.frame->key);
     send_frame(stream, std::move(*step.frame));
   }
@@ -311,37 +308,6 @@ void TileSchedulerActor::answer_meanwhile(Stream& stream) {
     if (stream.state.answers_in_flight(member->id)) continue;  // it is answered in order
     tell_no_change(*std::exchange(member->answer, std::nullopt));
   }
-}
-
-void TileSchedulerActor::tell_no_change(const ViewAnswer& answer) {
-  const auto* session = find(answer.session);
-  ViewAnswer full = answer;
-  full.resolution_error = session ? session->resolution_error : 0.0f;
-  peers_->sessions->find(answer.session).tell(session::NoChange(full, session ? session->error : 1.0f));
-}
-
-// An error takes a millisecond to know: where many share a stream, each of theirs is looked at less often.
-std::vector<encoder::ViewError> TileSchedulerActor::errors_of(const Stream& stream) {
-  std::vector<encoder::ViewError> out;
-  const auto now = now_us();
-  const auto enough = kErrorEvery * static_cast<Microseconds>(stream.members.size() - 1);
-  for (auto* member : stream.members) {
-    if (!member->error_at || now - *member->error_at >= enough) {
-      const auto& demand = stream.demand;
-      const bool coarse = coarse_ != nullptr;
-      const auto& seen = member->set.current();
-      const bool nothing = seen.samples() > 0 && seen.chains().empty();  // but the sky
-      member->error =
-          nothing ? 0.0f
-          : stream.shared()
-              ? view_error(member->set.current(), stream.known, demand, images(), layout_->coarse_level(), coarse)
-              : view_error(demand.chains, demand.granted.served, images(), layout_->coarse_level(), coarse);
-      member->resolution_error = member->set.current().resolution_error();
-      member->error_at = now;
-    }
-    out.push_back({member->id, member->error, member->resolution_error});
-  }
-  return out;
 }
 
 void TileSchedulerActor::send_frame(Stream& stream, encoder::ComposeFrame frame) {

@@ -87,6 +87,7 @@ void TileSchedulerActor::compose_view(Session& session) {
   if (!session.link.ready(now_us())) return;
   auto step = session.view_layer->step(now_us(), view_pace_.interval(view_streams_, false));
   if (!step.frame) return;
+  step.frame->errors = {session.told};
   step.frame->most_bytes = session.link.most_bytes(step.frame->key) / 2;  // the shared light has the other half
   if (!session.view_encoder)
     session.view_encoder = peers_->make_encoder(session.view_stream_id, session.format.view_format());

@@ -186,9 +186,20 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
                                   options);
 }
 
+ErrorOptions error_options(const ViewTone& tone) {
+  constexpr float kEnough = 0.15f;  // as far from black and from white noise has all the room it takes
+  ErrorOptions options;
+  const float room = std::min({1.0f, tone.brightness / kEnough, tone.headroom / kEnough});
+  options.coarse_tex *= room;
+  options.variety = tone.variety;
+  return options;
+}
+
 float view_error(std::span<const WeightedChain> chains, std::span<const std::uint8_t> served, const ImageLookup& images,
                  int coarse_level, bool has_coarse, const ErrorOptions& options) {
-  const auto too_coarse = [](int levels) { return double{error_of_coarser(static_cast<float>(levels))}; };
+  const auto too_coarse = [&](int levels) {
+    return double{error_of_coarser(static_cast<float>(levels))} * double{options.variety};
+  };
   double sum = 0;
   double weight = 0;
   for (std::size_t c = 0; c < chains.size(); ++c) {

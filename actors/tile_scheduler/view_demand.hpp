@@ -11,6 +11,7 @@
 #include "actors/tile_scheduler/seen.hpp"
 #include "actors/tile_scheduler/slot_allocation.hpp"
 #include "actors/tile_scheduler/stream_state.hpp"
+#include "actors/tile_scheduler/view_tone.hpp"
 
 namespace darm::tile_scheduler {
 
@@ -61,7 +62,11 @@ struct ErrorOptions {
   /// atrium is at 28.6 dB), coded in 300 kB.
   float coarse_tex = 0.03f;
   float unlit = 0.25f;  ///< of a sample that nothing serves yet
+  float variety = 1;    ///< ViewTone::variety: what coarser texels lose is as much less
 };
+
+/// What is plain, black or white is not wrong by as much.
+[[nodiscard]] ErrorOptions error_options(const ViewTone& tone);
 
 /// Estimated display error of the light a view has: RMS over its samples of the error of the tile that serves each and
 /// of how much coarser than sharp it is (coarseness.hpp). `has_coarse`: CoarseTex serves what no tile does. 0..1.

@@ -8,7 +8,8 @@ namespace darm::tile_scheduler {
 ViewJob::ViewJob(std::uint64_t number, std::shared_ptr<const atlas::Layout> layout,
                  std::shared_ptr<const renderer::trace::RayScene> rays, const Camera& camera, const Viewport& viewport,
                  int first_pass, int pass_count, unsigned slices,
-                 std::shared_ptr<const std::vector<scene::ViewMaterial>> materials, std::uint32_t rays_per_pass)
+                 std::shared_ptr<const std::vector<scene::ViewMaterial>> materials, bool own,
+                 std::uint32_t rays_per_pass)
     : number_(number),
       layout_(std::move(layout)),
       rays_(std::move(rays)),
@@ -18,7 +19,7 @@ ViewJob::ViewJob(std::uint64_t number, std::shared_ptr<const atlas::Layout> layo
       rays_per_pass_(rays_per_pass),
       materials_(std::move(materials)),
       results_(std::clamp(slices, 1u, std::max(1u, block_rows(viewport, rays_per_pass)))),
-      private_(materials_ ? results_.size() : 0),
+      private_(materials_ && own ? results_.size() : 0),
       left_(static_cast<unsigned>(results_.size())) {
   for (unsigned slice = 0; slice < slice_count(); ++slice) places_.push_back({first_pass, first_row(slice)});
   if (rays_per_pass_ < kRaysPerStep) results_.front().reserve(rays_per_pass_, 4 * std::size_t{rays_per_pass_});
@@ -42,7 +43,7 @@ double ViewJob::samples() const {
 
 ViewJob::Step ViewJob::run_step(unsigned slice) {
   PrivateSamples own;
-  if (materials_) own = {*materials_, &private_[slice]};
+  if (materials_) own = {*materials_, private_.empty() ? nullptr : &private_[slice]};
   auto& at = places_[slice];
   const auto end = first_row(slice + 1);
   const auto rays_per_row = block_columns(sampler_.viewport(), rays_per_pass_);

@@ -20,12 +20,13 @@ inline constexpr std::uint32_t kRaysPerStep = 2048;
 /// may read `results`.
 class ViewJob {
  public:
-  /// `materials`, by instance: gathers also what depends on the eye. `rays_per_pass`: as trace_rows() has it.
+  /// `materials`, by instance, or null: what depends on the eye is estimated; `own`: and what a private layer would
+  /// hold of it gathered. `rays_per_pass`: as trace_rows() has it.
   /// Traces passes [first_pass, first_pass + pass_count) in at most `slices` slices (at least 1).
   ViewJob(std::uint64_t number, std::shared_ptr<const atlas::Layout> layout,
           std::shared_ptr<const renderer::trace::RayScene> rays, const Camera& camera, const Viewport& viewport,
           int first_pass, int pass_count, unsigned slices,
-          std::shared_ptr<const std::vector<scene::ViewMaterial>> materials = nullptr,
+          std::shared_ptr<const std::vector<scene::ViewMaterial>> materials = nullptr, bool own = false,
           std::uint32_t rays_per_pass = kMaxRays);
 
   enum class Step : std::uint8_t { kMore, kSliceDone, kAllDone };
@@ -49,7 +50,7 @@ class ViewJob {
   [[nodiscard]] std::vector<VisibleSet> take_results() { return std::move(results_); }
   /// Picture samples of all results, once done.
   [[nodiscard]] double samples() const;
-  /// What depends on the eye; empty if no materials were given.
+  /// What a private layer would hold; empty if that was not to be gathered.
   [[nodiscard]] const std::vector<PrivateSet>& private_results() const { return private_; }
 
   ViewAnswer answer;         ///< the camera that the result answers; for the owner, slices do not touch it
@@ -72,7 +73,7 @@ class ViewJob {
   int first_pass_;
   int pass_count_;
   std::uint32_t rays_per_pass_;
-  std::shared_ptr<const std::vector<scene::ViewMaterial>> materials_;  // null: nothing private is gathered
+  std::shared_ptr<const std::vector<scene::ViewMaterial>> materials_;  // null: none known
   std::vector<VisibleSet> results_;
   std::vector<PrivateSet> private_;
   std::vector<Place> places_;  // of each slice

@@ -163,7 +163,10 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
       const int layers = sampler.trace(x, y, surfaces);
       for (std::size_t i = 0; i < static_cast<std::size_t>(layers); ++i) {
         add_sample(sampler.layout(), surfaces[i], early, note_taps, out);
-        if (gather) own.set->add(sampler.layout(), surfaces[i], own.materials[surfaces[i].instance], early);
+        if (own.materials.empty()) continue;
+        const auto& material = own.materials[surfaces[i].instance];
+        out.add_omitted(double{material.omitted} * double{material.omitted}, double{material.diffuse});
+        if (gather) own.set->add(sampler.layout(), surfaces[i], material, early);
       }
       ++samples;
     }

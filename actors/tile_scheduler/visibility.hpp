@@ -44,10 +44,11 @@ inline constexpr std::array<glm::vec2, 4> kClientSamples{
 /// sample also marks the texels around it that the unseen pixels of its block probably read (TileUse::early).
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out);
 
-/// What of the samples depends on the eye, gathered beside them.
+/// What of the samples depends on the eye: how much of it is told by the VisibleSet, and what a private layer would
+/// hold of it is gathered beside that.
 struct PrivateSamples {
-  std::span<const scene::ViewMaterial> materials;  ///< by instance; empty: nothing is gathered
-  PrivateSet* set = nullptr;
+  std::span<const scene::ViewMaterial> materials;  ///< by instance; empty: nothing is known
+  PrivateSet* set = nullptr;                       ///< null: nothing is gathered
 };
 /// `rays`: of a pass, as block_side() has it. Fewer than kMaxRays make a glance, not a pass.
 void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, std::uint32_t last_row, VisibleSet& out,

@@ -57,6 +57,8 @@ void VisibleSet::merge(const VisibleSet& other, float share, std::size_t most_ta
   }
   samples_ += other.samples_ * double{share};
   magnified_ += other.magnified_ * double{share};
+  omitted_ += other.omitted_ * double{share};
+  diffuse_ += other.diffuse_ * double{share};
   left_out_ += other.left_out_;
 }
 
@@ -76,10 +78,25 @@ void VisibleSet::forget_early() {
 
 void VisibleSet::clear() { *this = VisibleSet{}; }
 
+double VisibleSet::surface_samples() const {
+  double out = 0;
+  for (const float count : counts_) out += double{count};
+  return out;
+}
+
 float VisibleSet::resolution_error() const {
-  double weight = 0;
-  for (const float count : counts_) weight += double{count};
-  return weight > 0 ? static_cast<float>(std::sqrt(magnified_ / weight)) : 0.0f;
+  const double samples = surface_samples();
+  return samples > 0 ? static_cast<float>(std::sqrt(magnified_ / samples)) : 0.0f;
+}
+
+float VisibleSet::omitted_error() const {
+  const double samples = surface_samples();
+  return samples > 0 ? static_cast<float>(std::sqrt(omitted_ / samples)) : 0.0f;
+}
+
+float VisibleSet::mean_diffuse() const {
+  const double samples = surface_samples();
+  return samples > 0 ? static_cast<float>(diffuse_ / samples) : 0.0f;
 }
 
 const TileUse* VisibleSet::find(TileId tile) const {

@@ -43,6 +43,11 @@ class VisibleSet {
   void add_taps(const SampleTaps& taps);
   /// Squared display error of a sample for want of finer texels than the atlas has.
   void add_magnified(double squared_error) { magnified_ += squared_error; }
+  /// A sample's ViewMaterial::omitted, squared, and ViewMaterial::diffuse.
+  void add_omitted(double squared_error, double diffuse) {
+    omitted_ += squared_error;
+    diffuse_ += diffuse;
+  }
   /// A sample that hit nothing: counts in samples() only.
   void add_samples(double count) { samples_ += count; }
   /// The texels of `tile`; null if the set is full. Valid until the next call.
@@ -65,6 +70,11 @@ class VisibleSet {
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
   /// RMS over the samples on surfaces of what add_magnified() was told, 0..1.
   [[nodiscard]] float resolution_error() const;
+  /// RMS over the same of what add_omitted() was told, and the mean albedo, 0..1.
+  [[nodiscard]] float omitted_error() const;
+  [[nodiscard]] float mean_diffuse() const;
+  /// Samples on surfaces: a layer of glass and what is behind it count both.
+  [[nodiscard]] double surface_samples() const;
 
  private:
   static constexpr std::array<TileId, kMaxLevels> no_tiles() {
@@ -80,6 +90,8 @@ class VisibleSet {
   std::vector<TileUse> uses_;
   double samples_ = 0;
   double magnified_ = 0;
+  double omitted_ = 0;
+  double diffuse_ = 0;
   std::size_t left_out_ = 0;
   // Neighbouring samples mostly share chain and tiles: the last tile of each level, the last chain.
   std::array<TileId, kMaxLevels> last_tile_ = no_tiles();

@@ -31,6 +31,7 @@ struct ViewAnswer {
   FrameStamps stamps;
   float error = 0;             ///< estimated RMS display error of the light of that session's view, 0..1
   float resolution_error = 0;  ///< beside it: of an atlas whose finest texels are larger than the view's pixels
+  float omitted_error = 0;     ///< beside both: of light that depends on the eye, where the session has no layer for it
 };
 
 }  // namespace darm

@@ -88,6 +88,7 @@ PanelLines panel_lines(const Measured& m) {
           {"Coarser than asked", fallback ? fmt::format("{:.1f} %", *fallback * 100) : "-"},
           {"Error of the light", m.error && *m.error >= 0 ? error_text(*m.error) : "-"},
           {"Error of resolution", error_text(m.resolution_error)},
+          {"Reflections left out", error_text(m.omitted_error)},
           {"Cost", cost}};
 }
 
@@ -108,6 +109,7 @@ std::string report_json(const VisitFigures& f, const Measured& last) {
   j["bytes"] = last.traffic.received;
   j["error"] = optional(last.error);
   j["resolution_error"] = last.resolution_error;
+  j["omitted_error"] = last.omitted_error;
   j["fallback"] = optional(last.residency ? fallback_share(*last.residency) : std::nullopt);
   j["size"] = {f.width, f.height};
   j["guard_divisor"] = f.coarsest;

@@ -58,6 +58,7 @@ struct Measured {
   std::optional<ResidencyCounts> residency;
   std::optional<double> error;  ///< estimated RMS display error of the light, 0..1
   double resolution_error = 0;  ///< beside it: for want of finer texels than the atlas has
+  double omitted_error = 0;     ///< beside both: of light that depends on the eye and is not streamed
   double seconds = 0;           ///< since the start
 };
 

@@ -214,10 +214,12 @@ Result<void> LiveStream::begin_scene(const wire::SceneManifest& manifest) {
   return {};
 }
 
-void LiveStream::note_answer(std::uint64_t answers, double error, double resolution_error) {
+void LiveStream::note_answer(const Errors& errors, std::uint64_t answers) {
   answered_ = std::max(answered_, answers);
-  if (error >= 0 && std::isfinite(error)) answer_.error = error;
-  if (resolution_error >= 0 && std::isfinite(resolution_error)) answer_.resolution_error = resolution_error;
+  const auto sound = [](float e) { return e >= 0 && std::isfinite(e); };
+  if (sound(errors.light)) answer_.error = double{errors.light};
+  if (sound(errors.resolution)) answer_.resolution_error = double{errors.resolution};
+  if (sound(errors.omitted)) answer_.omitted_error = double{errors.omitted};
 }
 
 Result<void> LiveStream::handle_frame(const Received& message) {
@@ -239,7 +241,7 @@ Result<void> LiveStream::handle_frame(const Received& message) {
     a.frame = frame.frame();
     if (a.decode_ms.size() < 1000) a.decode_ms.push_back(static_cast<double>(decode_us_) / 1000);
     a.answers_us = std::max(a.answers_us, frame.stamps().client_sent());
-    note_answer(frame.answers(), static_cast<double>(frame.error()), static_cast<double>(frame.resolution_error()));
+    note_answer({frame.error(), frame.resolution_error(), frame.omitted_error()}, frame.answers());
   });
   return {};
 }
@@ -284,8 +286,8 @@ Result<void> LiveStream::handle(const Received& message) {
       return handle_view_frame(e.view_frame());
     case wire::Envelope::kNoChange: {
       const std::lock_guard lock(mutex_);
-      note_answer(e.no_change().answers(), static_cast<double>(e.no_change().error()),
-                  static_cast<double>(e.no_change().resolution_error()));
+      const auto& answer = e.no_change();
+      note_answer({answer.error(), answer.resolution_error(), answer.omitted_error()}, answer.answers());
       const std::int64_t sent = e.no_change().stamps().client_sent();
       if (sent > 0) answer_.lag_ms = static_cast<double>(message.at_us - sent) / 1000;
       return {};

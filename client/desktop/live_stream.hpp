@@ -45,6 +45,7 @@ struct Arrivals {
 struct Answer {
   std::optional<double> error;   ///< the newest estimate, of light
   double resolution_error = 0;   ///< beside it: for want of finer texels than the atlas has
+  double omitted_error = 0;      ///< beside both: of light that depends on the eye and is not streamed
   std::optional<double> lag_ms;  ///< from a camera sent until the server said that its picture needs no change
 };
 
@@ -90,8 +91,11 @@ class LiveStream {
   [[nodiscard]] Result<void> begin_scene(const wire::SceneManifest& manifest);
   [[nodiscard]] Result<void> handle_frame(const Received& message);
   [[nodiscard]] Result<void> handle_view_frame(const wire::StreamFrame& frame);
+  struct Errors {
+    float light, resolution, omitted;
+  };
   // Under the lock.
-  void note_answer(std::uint64_t answers, double error, double resolution_error);
+  void note_answer(const Errors& errors, std::uint64_t answers);
   [[nodiscard]] Result<void> send_due(Connection& connection);
   [[nodiscard]] Result<void> ask_for_keys(Connection& connection, std::int64_t now);
   // Changes the arrivals under the lock, then wakes whoever draws.

@@ -155,6 +155,7 @@ void Viewer::take_answer() {
   const Answer answer = stream_->take_answer();
   if (answer.error) measured_.error = answer.error;
   measured_.resolution_error = answer.resolution_error;
+  measured_.omitted_error = answer.omitted_error;
   if (answer.lag_ms) note_lag(*answer.lag_ms);
 }
 

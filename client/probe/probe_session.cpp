@@ -138,6 +138,7 @@ Result<void> Run::handle_frame(const Received& message) {
     report_.key_frames += frame.key() ? 1 : 0;
     report_.error = frame.error();
     report_.resolution_error = frame.resolution_error();
+    report_.omitted_error = frame.omitted_error();
     report_.latency_ms["decode"].push_back(static_cast<double>(decode_us_) / 1000.0);
     note_answer(frame.answers(), frame.stamps(), message.at_us);
     if (plan_.lag) lag_.picture_decoded(frame.answers(), frame.stamps(), {message.at_us, before, decoded});
@@ -197,6 +198,7 @@ Result<void> Run::handle(const Received& message) {
       if (first_image_us_ > 0) report_.stream_bytes_after_first_image += message.bytes;
       report_.error = e.no_change().error();
       report_.resolution_error = e.no_change().resolution_error();
+      report_.omitted_error = e.no_change().omitted_error();
       note_answer(e.no_change().answers(), e.no_change().stamps(), message.at_us);
       lag_.no_change(e.no_change().answers());
       return {};

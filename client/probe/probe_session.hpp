@@ -71,6 +71,7 @@ struct SessionReport {
   std::uint64_t frames = 0, key_frames = 0, no_changes = 0, answers = 0, cameras = 0, frames_lost = 0;
   std::optional<double> error;  ///< the server's newest estimate, of light
   double resolution_error = 0;  ///< beside it: for want of finer texels than the atlas has
+  double omitted_error = 0;     ///< beside both: of light that depends on the eye and is not streamed
   std::vector<SeriesPoint> series;
   std::map<std::string, std::vector<double>> latency_ms;
   std::vector<LagSample> lag;        ///< with `lag`

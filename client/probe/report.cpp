@@ -96,6 +96,7 @@ std::string to_json(const Outcome& o) {
   j["rmse"] = o.score ? Json(o.score->rmse) : Json(nullptr);
   j["error"] = optional(s.error);
   j["resolution_error"] = s.resolution_error;
+  j["omitted_error"] = s.omitted_error;
   j["seconds_to_first_image"] = s.first_image.seconds;
   j["bytes_to_first_image"] = s.first_image.bytes.total;
   j["first_picture"] = to_json(s.first_picture);
@@ -149,10 +150,11 @@ std::string to_text(const Outcome& o) {
   if (!text.empty()) text += "\n";
   text += fmt::format(
       "first picture after {:.2f} s and {:.2f} MB, with the stream {:.2f} s and {:.2f} MB; {} frames, {} without "
-      "change, {:.2f} Mbit/s, estimated error {}, beside it for want of finer texels {:.4f}\n",
+      "change, {:.2f} Mbit/s, estimated error {}, beside it for want of finer texels {:.4f}, "
+      "for want of light that depends on the eye {:.4f}\n",
       s.first_picture.seconds, static_cast<double>(s.first_picture.bytes.total) / 1e6, s.first_image.seconds,
       static_cast<double>(s.first_image.bytes.total) / 1e6, s.frames, s.no_changes, mbit_per_second(s),
-      s.error ? fmt::format("{:.4f}", *s.error) : "not told", s.resolution_error);
+      s.error ? fmt::format("{:.4f}", *s.error) : "not told", s.resolution_error, s.omitted_error);
   text += fmt::format("sharp {:.1f} %, coarser {:.1f} %, CoarseTex {:.1f} %, background {:.1f} %\n",
                       100 * share(s.residency.sharp, s.residency.samples),
                       100 * share(s.residency.coarser, s.residency.samples),

@@ -131,7 +131,7 @@ tile_scheduler::StreamFormat format_of(const RunOptions& options, const World& w
   tile_scheduler::StreamFormat format;
   format.phystex_size = options.config.stream.phystex;
   format.chroma_444 = options.config.stream.chroma_444;
-  if (options.private_layer && world.view_materials) format.view_phystex = options.config.stream.view_phystex;
+  if (options.private_layer && world.has_view_layer()) format.view_phystex = options.config.stream.view_phystex;
   return format;
 }
 

@@ -78,6 +78,8 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_view_frame_writes", "Slots written per frame of a private layer"},
     {"darm_view_frames_total", "Frames of private layers coded"},
     {"darm_view_key_frames_put_off_total", "Key frames of private layers asked for too soon, and made later"},
+    {"darm_view_omitted_error",
+     "Expected RMS display error (0..1) of a view for want of light that depends on its eye"},
     {"darm_view_pictures_total", "Pictures of tiles of private layers"},
     {"darm_view_private_tiles", "Tiles that a view's private layer should have"},
     {"darm_view_resolution_error",

@@ -24,6 +24,7 @@ TEST(Figures, ThePanelTellsNumbersWithTheirUnits) {
   m.lag_ms = 132.4;
   m.error = 0.01;
   m.resolution_error = 0.1;
+  m.omitted_error = 0.05;
   m.traffic.received = 3'200'000;
   m.seconds = 100;
   m.residency = ResidencyCounts{1000, 10, 810, 50, 30, 100};
@@ -34,6 +35,7 @@ TEST(Figures, ThePanelTellsNumbersWithTheirUnits) {
   EXPECT_EQ(lines.at("Coarser than asked"), "10.0 %") << "of the samples that show a surface";
   EXPECT_EQ(lines.at("Error of the light"), "2.55 of 255 (40.0 dB)");
   EXPECT_EQ(lines.at("Error of resolution"), "25.50 of 255 (20.0 dB)");
+  EXPECT_EQ(lines.at("Reflections left out"), "12.75 of 255 (26.0 dB)");
   EXPECT_EQ(lines.at("Cost"), "3.2 MB (115.2 MB an hour), ms: decoding 6, uploading 2, drawing 4");
 }
 

@@ -9,14 +9,14 @@
 namespace darm::renderer {
 namespace {
 
-double srgb(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055; }
+double exact_srgb(double x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055; }
 
 TEST(DisplayCurveTest, code_is_the_rounded_curve) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> exponent(-14.0f, 0.0f);
   for (int i = 0; i < 200'000; ++i) {
     const float x = std::exp2(exponent(random));
-    const double exact = 255.0 * srgb(x);
+    const double exact = 255.0 * exact_srgb(x);
     ASSERT_NEAR(srgb_code(x), exact, 0.5001) << x;
   }
   for (int c = 0; c < 256; ++c) {
@@ -24,6 +24,20 @@ TEST(DisplayCurveTest, code_is_the_rounded_curve) {
     const double x = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
     EXPECT_EQ(srgb_code(static_cast<float>(x)), c);
   }
+}
+
+TEST(DisplayCurveTest, values_between_codes_rise_with_the_curve) {
+  float before = 0;
+  for (int i = 0; i <= 1'000'000; ++i) {
+    const float x = static_cast<float>(i) * 1.1e-6f;
+    const float shown = srgb(x);
+    ASSERT_GE(shown, before) << x;
+    ASSERT_NEAR(shown, exact_srgb(std::min(1.0f, x)), 5e-5) << x;
+    before = shown;
+  }
+  EXPECT_EQ(srgb(std::nanf("")), 0.0f);
+  EXPECT_EQ(srgb(-1.0f), 0.0f);
+  EXPECT_EQ(srgb(std::numeric_limits<float>::infinity()), 1.0f);
 }
 
 TEST(DisplayCurveTest, what_is_no_number_or_out_of_range_is_clamped) {
@@ -35,7 +49,7 @@ TEST(DisplayCurveTest, what_is_no_number_or_out_of_range_is_clamped) {
 
 TEST(DisplayCurveTest, slope_is_the_derivative) {
   for (const double x : {0.002, 0.05, 0.2, 0.8}) {
-    const double d = (srgb(x + 1e-5) - srgb(x - 1e-5)) / 2e-5;
+    const double d = (exact_srgb(x + 1e-5) - exact_srgb(x - 1e-5)) / 2e-5;
     EXPECT_NEAR(srgb_slope(srgb_code(static_cast<float>(x))) / d, 1.0, 0.05);
   }
 }

@@ -209,6 +209,22 @@ TEST_F(TileDisplayTest, error_is_that_of_a_pixel_which_reads_five_texels) {
   }
 }
 
+TEST_F(TileDisplayTest, noise_over_white_is_no_error) {
+  float scale = 0;
+  world_.world.light = [&](TileId id, int t, std::uint32_t s) {
+    return TexelLight{{}, glm::vec3(scale * (0.5f + noise_of(id, t, s)))};
+  };
+  const auto error_at = [&](float light) {
+    scale = light;
+    shade(middle_, 16);
+    return draw(middle_, 0).error;
+  };
+  const float middle = error_at(0.3f);
+  EXPECT_GT(middle, 0.005f);
+  scale = 1000;  // means rise far over white, whatever was there before
+  EXPECT_EQ(error_at(1000), 0.0f);
+}
+
 TEST_F(TileDisplayTest, light_that_is_no_number_never_reaches_the_picture) {
   world_.world.light = [](TileId, int t, std::uint32_t s) {
     const bool bad = t == 40 || s % 3 == 1;

@@ -130,5 +130,48 @@ TEST_F(ViewTileTest, noise_is_told_and_ends_the_work) {
   EXPECT_FALSE(tile.finished(options, 0.0f)) << "no target: it goes on";
 }
 
+TEST_F(ViewTileTest, noise_counts_as_it_shows_on_top_of_the_shared_light) {
+  float beneath = 0;
+  world.light = [&](TileId, int at, const glm::vec3&, std::uint32_t n) {
+    ViewDependentLight l;
+    l.radiance = glm::vec3((n * 7 + static_cast<std::uint32_t>(at)) % 2 == 0 ? 0.04f : 0.0f);
+    l.ggx_alpha = 0.001f;
+    l.distance = 1;
+    l.beneath = beneath;
+    return l;
+  };
+  const auto error_on = [&](float light) {
+    beneath = light;
+    ViewTile own(1.0f);
+    own.want(whole_slot());
+    own.see_from({1, 0, 0}, options);
+    own.shade(slot, 16);
+    return own.draw(slot).error;
+  };
+  const float on_black = error_on(0);
+  const float on_grey = error_on(0.3f);
+  EXPECT_GT(on_black, 3 * on_grey);
+  EXPECT_GT(on_grey, 0.0f);
+  EXPECT_EQ(error_on(5), 0.0f) << "it is white whatever comes on top";
+}
+
+TEST_F(ViewTileTest, what_its_filter_smears_counts) {
+  // Stripes without noise that a wide lobe's filter blurs while samples are few.
+  world.light = [](TileId, int at, const glm::vec3&, std::uint32_t) {
+    ViewDependentLight l;
+    l.radiance = glm::vec3(at / 4 % 2 == 0 ? 0.5f : 0.1f);
+    l.ggx_alpha = 0.5f;
+    l.distance = 1;
+    return l;
+  };
+  tile.want(whole_slot());
+  tile.see_from({1, 0, 0}, options);
+  tile.shade(slot, 16);
+  const float smeared = tile.draw(slot).error;
+  EXPECT_GT(smeared, 0.03f);
+  tile.shade(slot, 240);
+  EXPECT_LT(tile.draw(slot).error, 1e-3f) << "the filter is gone";
+}
+
 }  // namespace
 }  // namespace darm::renderer

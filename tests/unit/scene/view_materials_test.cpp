@@ -45,6 +45,9 @@ TEST(ViewMaterials, a_scene_of_matte_surfaces_has_no_private_layer) {
   const auto weights = view_materials(scene_of({plaster(0.9f), plaster(1.0f), matte, unlit, dark}));
   EXPECT_FALSE(calls_for_view_layer(weights));
   for (const auto& m : weights) EXPECT_EQ(m.weight, 0.0f);
+  EXPECT_GT(weights[0].omitted, 0.02f) << "its sheen is left out, and told";
+  EXPECT_EQ(weights[2].omitted, 0.0f);
+  EXPECT_EQ(weights[3].omitted, 0.0f);
 }
 
 TEST(ViewMaterials, beside_a_mirror_rough_surfaces_join_at_coarse_levels) {
@@ -53,6 +56,8 @@ TEST(ViewMaterials, beside_a_mirror_rough_surfaces_join_at_coarse_levels) {
   const auto weights = view_materials(scene_of({plaster(0.9f), mirror(), matte}));
   ASSERT_TRUE(calls_for_view_layer(weights));
   EXPECT_GT(weights[1].weight, 5 * weights[0].weight);
+  EXPECT_LT(weights[1].omitted, weights[1].weight) << "worth more than it shows in the mean: it is sharp";
+  EXPECT_NEAR(weights[1].diffuse, 0.0f, 1e-6f) << "metal";
   EXPECT_EQ(weights[1].coarser, 0);
   EXPECT_GT(weights[0].weight, 0.0f);
   EXPECT_EQ(weights[0].coarser, 3);

@@ -118,5 +118,30 @@ TEST_F(PrivateLayerTest, sends_what_has_come_and_forgets_the_pose_before_in_time
   EXPECT_GT(before, 0u);
 }
 
+TEST_F(PrivateLayerTest, the_error_left_is_what_is_missing_then_what_the_pictures_have) {
+  auto materials = all_of(0.5f, 0);
+  for (auto& m : materials) m.omitted = 0.3f;
+  VisibleSet shared;
+  auto layer = layer_of(512);
+  EXPECT_EQ(layer.squared_error(1), 0.0);
+  layer.add(see(materials, &shared));
+  layer.reallocate({}, world.layout->coarse_level());
+  const double surfaces = shared.surface_samples() / shared.samples();
+  EXPECT_NEAR(layer.squared_error(1), 0.09 * surfaces, 1e-4) << "nothing has come";
+  EXPECT_NEAR(layer.squared_error(0.5f), 0.0225 * surfaces, 1e-4);
+  EXPECT_NEAR(shared.omitted_error(), 0.3f, 1e-5f) << "what a session without a layer lacks";
+  std::vector<ShadedTile> tiles;
+  for (const auto& request : *layer.requests()) {
+    auto& tile = tiles.emplace_back();
+    tile.tile = request.tile;
+    tile.version = 1;
+    tile.error = 0.02f;
+    tile.image = std::make_shared<TileImage>();
+  }
+  layer.put(tiles);
+  layer.reallocate({}, world.layout->coarse_level());
+  EXPECT_NEAR(layer.squared_error(1), 0.0004 * surfaces, 1e-5) << "all slots suffice";
+}
+
 }  // namespace
 }  // namespace darm::tile_scheduler
