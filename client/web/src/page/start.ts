@@ -63,6 +63,7 @@ async function start(): Promise<void> {
 }
 
 start().catch((error: unknown) => {
+  element('stage').hidden = true;
   const alert = element('alert');
   alert.textContent = `The page could not start (${String(error)}): please reload it.`;
   alert.hidden = false;
