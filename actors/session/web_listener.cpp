@@ -340,7 +340,8 @@ class Visit : public std::enable_shared_from_this<Visit<Stream>> {
   void drain() {
     buffer_.clear();
     stream_.async_read_some(buffer_.prepare(4096), [self = this->shared_from_this()](error_code ec, std::size_t n) {
-      if (ec || (self->drained_ += n) > 64 * kHeaderBytes) return;
+      self->drained_ += n;
+      if (ec || self->drained_ > 64 * kHeaderBytes) return;
       if constexpr (std::is_same_v<Stream, PlainStream>) self->drain();
     });
   }

@@ -58,6 +58,9 @@ test('a server without HTTPS offers none, but says how to get in', async () => {
   await alert.waitFor();
   assert.match(await alert.innerText(), new RegExp(`no HTTPS: open http://localhost:${daemon.web}/ on its own machine`));
   assert.equal(await page.getByRole('link').count(), 0);
+  await page.setViewportSize({width: 240, height: 120});
+  const {y, height} = await alert.boundingBox();
+  assert.ok(y >= 0 && y + height <= 120, 'where it does not fit it scrolls');
   await nothingToPress(page);
   await context.close();
   await daemon.stop();

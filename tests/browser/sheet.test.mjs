@@ -97,20 +97,24 @@ test('on a phone everything is on the screen, large enough for a thumb, and the 
     const {left, top, right, bottom} = element.getBoundingClientRect();
     return {id: element.id || element.textContent, left, top, right, bottom};
   }), selector);
-  const fits = (box) => assert.ok(box.left >= 0 && box.top >= 0 && box.right <= 360 && box.bottom <= 640, JSON.stringify(box));
+  const fits = (box, width = 360, height = 640) => assert.ok(
+    box.left >= 0 && box.top >= 0 && box.right <= width && box.bottom <= height, JSON.stringify(box));
   await page.getByRole('button', {name: 'Numbers'}).tap();
-  const shown = await boxes('#buttons button, #panel');
-  shown.forEach(fits);
-  for (const [i, a] of shown.entries()) {
-    if (a.id !== 'panel') assert.ok(a.right - a.left >= 44 && a.bottom - a.top >= 44, JSON.stringify(a));
-    for (const b of shown.slice(i + 1)) {
-      const apart = a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
-      assert.ok(apart, `${a.id} and ${b.id} lie over each other`);
+  for (const [width, height] of [[180, 320], [640, 360], [360, 640]]) {  // twice as large, turned, as it is
+    await page.setViewportSize({width, height});
+    const shown = await boxes('#buttons button, #panel');
+    shown.forEach((box) => fits(box, width, height));
+    for (const [i, a] of shown.entries()) {
+      if (a.id !== 'panel') assert.ok(a.right - a.left >= 44 && a.bottom - a.top >= 44, JSON.stringify(a));
+      for (const b of shown.slice(i + 1)) {
+        const apart = a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+        assert.ok(apart, `${a.id} and ${b.id} lie over each other`);
+      }
     }
   }
   await page.getByRole('button', {name: 'Help'}).tap();
   await sheet(page).waitFor();
-  (await boxes('#help, #help button')).forEach(fits);
+  (await boxes('#help, #help button')).forEach((box) => fits(box));
   const wide = await page.evaluate(() => document.getElementById('help').scrollWidth > document.getElementById('help').clientWidth);
   assert.ok(!wide, 'it is read from top to bottom alone');
   await page.getByRole('button', {name: 'Close'}).tap();
