@@ -98,7 +98,10 @@ Extent help(Extent bar) {
   ImGui::SetNextWindowBgAlpha(0.7f);
   ImGui::Begin("help", nullptr, kPlain | ImGuiWindowFlags_NoInputs);
   ImGui::SetWindowFontScale(scale);
+  const ImVec2 padding = ImGui::GetStyle().CellPadding;
+  ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {padding.x, padding.y * scale});
   table("keys", kHelp);
+  ImGui::PopStyleVar();
   ImGui::End();
   return {keys.width * scale, keys.height * scale};
 }
@@ -117,21 +120,26 @@ void panel(const OverlayShow& show, Extent bar, Extent sheet) {
   ImGui::End();
 }
 
+// In as many lines as it takes, no wider than `width` and the window.
+void wrapped(const std::string& text, float width) {
+  ImGui::PushTextWrapPos(std::max(1.0f, std::min(width, room().width - ImGui::GetStyle().WindowPadding.x)));
+  ImGui::TextUnformatted(text.c_str());
+  ImGui::PopTextWrapPos();
+}
+
 void words(const Notice& notice) {
   if (!notice.quiet.empty()) {
     place(0.5f, 1);
     ImGui::SetNextWindowBgAlpha(0.7f);
     ImGui::Begin("notice", nullptr, kPlain | ImGuiWindowFlags_NoInputs);
-    ImGui::TextUnformatted(notice.quiet.c_str());
+    wrapped(notice.quiet, room().width);
     ImGui::End();
   }
   if (!notice.alert.empty()) {
     place(0.5f, 0.5f);
     ImGui::SetNextWindowBgAlpha(0.9f);
     ImGui::Begin("alert", nullptr, kPlain | ImGuiWindowFlags_NoInputs);
-    ImGui::PushTextWrapPos(std::max(200.0f, ImGui::GetIO().DisplaySize.x * 0.6f));
-    ImGui::TextUnformatted(notice.alert.c_str());
-    ImGui::PopTextWrapPos();
+    wrapped(notice.alert, std::max(200.0f, room().width * 0.6f));
     ImGui::End();
   }
 }
