@@ -264,9 +264,15 @@ class Visit : public std::enable_shared_from_this<Visit<Stream>> {
     WebRequest asked{view_of(request.method_string()), view_of(request.target()), header(http::field::accept_encoding),
                      header(http::field::if_none_match), (length && *length > 0) || parser_->chunked()};
     if (websocket::is_upgrade(request)) return upgrade(asked);
-    auto reply =
-        answer(asked, house_->options.files, {!house_->stopping, house_->door.sessions(), house_->door.max_sessions()});
-    send(std::move(reply), parser_->keep_alive());
+    const WebHealth health{!house_->stopping, house_->door.sessions(), house_->door.max_sessions(), https_port()};
+    send(answer(asked, house_->options.files, health), parser_->keep_alive());
+  }
+
+  // The same as this one's: TLS is told apart by the first byte.
+  unsigned https_port() {
+    error_code ec;
+    const auto here = lowest(stream_).socket().local_endpoint(ec);
+    return house_->options.tls && !ec ? here.port() : 0;
   }
 
   void upgrade(const WebRequest& asked) {
@@ -334,7 +340,8 @@ class Visit : public std::enable_shared_from_this<Visit<Stream>> {
   void drain() {
     buffer_.clear();
     stream_.async_read_some(buffer_.prepare(4096), [self = this->shared_from_this()](error_code ec, std::size_t n) {
-      if (ec || (self->drained_ += n) > 64 * kHeaderBytes) return;
+      self->drained_ += n;
+      if (ec || self->drained_ > 64 * kHeaderBytes) return;
       if constexpr (std::is_same_v<Stream, PlainStream>) self->drain();
     });
   }

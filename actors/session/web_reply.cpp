@@ -80,7 +80,8 @@ WebReply health_reply(const WebHealth& health) {
   reply.text = std::string("{\"status\":\"") + (health.ready ? "ok" : "stopping") +
                "\",\"protocol\":" + std::to_string(proto::kProtocolVersion) +
                ",\"sessions\":" + std::to_string(health.sessions) +
-               ",\"max_sessions\":" + std::to_string(health.max_sessions) + "}\n";
+               ",\"max_sessions\":" + std::to_string(health.max_sessions) +
+               ",\"https_port\":" + std::to_string(health.https_port) + "}\n";
   return reply;
 }
 

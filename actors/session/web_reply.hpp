@@ -39,6 +39,7 @@ struct WebHealth {
   bool ready = true;
   unsigned sessions = 0;
   unsigned max_sessions = 0;
+  unsigned https_port = 0;  ///< where this server speaks HTTPS; 0: nowhere
 };
 
 /// GET and HEAD of a file or /healthz; everything else is refused with the status that says why. A path is looked up in

@@ -37,6 +37,8 @@ std::optional<Action> action_of(int key, bool control) {
       return Action::kLink;
     case GLFW_KEY_F1:
       return Action::kHelp;
+    case GLFW_KEY_ESCAPE:
+      return Action::kCloseHelp;
     case GLFW_KEY_F11:
       return Action::kFullScreen;
     case GLFW_KEY_F12:
@@ -55,6 +57,7 @@ Controls::Controls(GLFWwindow* window, Rig& rig, PointUnder point_under)
   glfwSetWindowUserPointer(window, this);
   glfwSetKeyCallback(window,
                      [](GLFWwindow* w, int key, int, int action, int mods) { of(w).on_key(key, action, mods); });
+  glfwSetCharCallback(window, [](GLFWwindow* w, unsigned code_point) { of(w).on_character(code_point); });
   glfwSetMouseButtonCallback(
       window, [](GLFWwindow* w, int button, int action, int mods) { of(w).on_button(button, action, mods); });
   glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { of(w).on_move(x, y); });
@@ -68,6 +71,7 @@ Controls::Controls(GLFWwindow* window, Rig& rig, PointUnder point_under)
 
 Controls::~Controls() {
   glfwSetKeyCallback(window_, nullptr);
+  glfwSetCharCallback(window_, nullptr);
   glfwSetMouseButtonCallback(window_, nullptr);
   glfwSetCursorPosCallback(window_, nullptr);
   glfwSetScrollCallback(window_, nullptr);
@@ -80,6 +84,11 @@ void Controls::on_key(int key, int action, int mods) {
   events_ = true;
   if (action != GLFW_PRESS || (mods & (GLFW_MOD_ALT | GLFW_MOD_SUPER)) != 0) return;
   if (const auto asked = action_of(key, (mods & GLFW_MOD_CONTROL) != 0)) actions_.push_back(*asked);
+}
+
+// By what it writes: its key is elsewhere on each keyboard.
+void Controls::on_character(unsigned code_point) {
+  if (code_point == '?') actions_.push_back(Action::kHelp);
 }
 
 void Controls::on_button(int button, int action, int mods) {

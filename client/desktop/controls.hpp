@@ -12,7 +12,7 @@
 
 namespace darm::client::desktop {
 
-enum class Action : std::uint8_t { kPanel, kMode, kBare, kLink, kScreenshot, kHelp, kFullScreen, kQuit };
+enum class Action : std::uint8_t { kPanel, kMode, kBare, kLink, kScreenshot, kHelp, kCloseHelp, kFullScreen, kQuit };
 
 /// Lives as long as the window, on its thread. Made before the overlay, which passes events on.
 class Controls {
@@ -39,6 +39,7 @@ class Controls {
 
  private:
   void on_key(int key, int action, int mods);
+  void on_character(unsigned code_point);
   void on_button(int button, int action, int mods);
   void on_move(double x, double y);
   void on_scroll(double steps);

@@ -27,6 +27,13 @@ std::string error_text(double error) {
   return error > 0 ? fmt::format("{} ({:.1f} dB)", levels, -20 * std::log10(error)) : levels;  // PSNR
 }
 
+std::string lag_text(const Measured& m) { return m.lag_ms ? fmt::format("{:.0f} ms", *m.lag_ms) : "-"; }
+
+std::string frames_text(const Measured& m) {
+  return m.frames_per_second ? fmt::format("{:.0f}{}", *m.frames_per_second, m.divisor > 1 ? ", coarser" : "")
+                             : "still";
+}
+
 Json spread(const Series& series) {
   if (series.empty()) return nullptr;
   return {{"p50", series.percentile(0.5)}, {"p99", series.percentile(0.99)}, {"count", series.count()}};
@@ -81,15 +88,22 @@ PanelLines panel_lines(const Measured& m) {
   if (m.seconds > 5)
     cost += fmt::format(" ({} an hour)", bytes_text(static_cast<double>(m.traffic.received) / m.seconds * 3600));
   cost += fmt::format(", ms: decoding {:.0f}, uploading {:.0f}, drawing {:.0f}", m.decode_ms, m.upload_ms, m.draw_ms);
-  const char* coarser = m.divisor > 1 ? ", coarser" : "";
-  return {{"Frames a second", m.frames_per_second ? fmt::format("{:.0f}{}", *m.frames_per_second, coarser) : "still"},
+  return {{"Frames a second", frames_text(m)},
           {"Stream", rate_text(m.bits_per_second)},
-          {"Shading lag", m.lag_ms ? fmt::format("{:.0f} ms", *m.lag_ms) : "-"},
+          {"Shading lag", lag_text(m)},
           {"Coarser than asked", fallback ? fmt::format("{:.1f} %", *fallback * 100) : "-"},
           {"Error of the light", m.error && *m.error >= 0 ? error_text(*m.error) : "-"},
           {"Error of resolution", error_text(m.resolution_error)},
           {"Reflections left out", error_text(m.omitted_error)},
           {"Cost", cost}};
+}
+
+PanelLines brief_lines(const Measured& m) {
+  const bool known = m.error && *m.error >= 0;
+  return {{"Frames/s", frames_text(m)},
+          {"Stream", rate_text(m.bits_per_second)},
+          {"Lag", lag_text(m)},
+          {"Error", known ? fmt::format("{:.2f} of 255", *m.error * 255) : "-"}};
 }
 
 std::string report_json(const VisitFigures& f, const Measured& last) {

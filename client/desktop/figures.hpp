@@ -65,6 +65,8 @@ struct Measured {
 /// Name and value of each line of the panel: frames a second, stream, shading lag, share of fallback, error, cost.
 using PanelLines = std::vector<std::array<std::string, 2>>;
 [[nodiscard]] PanelLines panel_lines(const Measured& m);
+/// The most telling of them in few words, for a small window.
+[[nodiscard]] PanelLines brief_lines(const Measured& m);
 
 /// Share of the samples on surfaces that are drawn coarser than asked for, or without light; nothing: none seen.
 [[nodiscard]] std::optional<double> fallback_share(const ResidencyCounts& counts);

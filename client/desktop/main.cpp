@@ -84,7 +84,8 @@ void declare(CLI::App& app, Arguments& a) {
       "W A S D and arrows walk, Q and E go down and up, R and F look up and down, Shift hurries, dragging looks "
       "around;\n"
       "O changes to orbiting, P shows measurements, H hides all but the scene, L copies a link, F12 saves a picture,\n"
-      "F11 fills the screen, Ctrl Q leaves. A gamepad's left stick walks, its right stick looks.");
+      "F11 fills the screen, F1 or ? shows these keys, Ctrl Q leaves. A gamepad's left stick walks, its right stick "
+      "looks.\n");
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ struct OverlayShow {
   bool panel = false;
   bool help = false;
   Mode mode = Mode::kWalk;
-  PanelLines lines;
+  PanelLines lines, brief;  ///< brief: where the window is too small for all
   Notice notice;
 };
 

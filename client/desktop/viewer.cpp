@@ -272,6 +272,7 @@ Result<void> Viewer::refresh_panel() {
     measured_.residency = *counts;
   }
   show_.lines = panel_lines(measured_);
+  show_.brief = brief_lines(measured_);
   return {};
 }
 
@@ -310,6 +311,9 @@ void Viewer::obey(Action action) {
       break;
     case Action::kHelp:
       show_.help = !show_.help;
+      break;
+    case Action::kCloseHelp:
+      show_.help = false;
       break;
     case Action::kLink:
       window_->set_clipboard(to_link(rig_.view));

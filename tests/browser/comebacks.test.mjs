@@ -22,13 +22,20 @@ async function inside(hash = '', {port = daemon.web, from = browser} = {}) {
   page.on('pageerror', (error) => faults.push(String(error)));
   await page.goto(`http://127.0.0.1:${port}/${hash}`);
   await until(page, (s) => s.firstPictureMs !== null && s.streamFrames > 0, 60, 'a picture');
-  await page.evaluate(() => (globalThis.notReloaded = true));
+  await page.evaluate(() => {
+    globalThis.notReloaded = true;
+    // All that is said: a line may be there for less than a frame of this machine.
+    globalThis.said = [];
+    const notice = document.getElementById('notice');
+    new MutationObserver(() => globalThis.said.push(notice.textContent)).observe(notice, {childList: true, subtree: true,
+      characterData: true});
+  });
   return {page, faults};
 }
 
 const notReloaded = (page) => page.evaluate(() => globalThis.notReloaded === true);
 const noticeSays = (page, words) => page.waitForFunction(
-  (source) => new RegExp(source).test(document.getElementById('notice').textContent), words.source);
+  (source) => globalThis.said.some((line) => new RegExp(source).test(line)), words.source, {polling: 50});
 
 // Takes the graphics context away for `ms`; from the page's side as a driver that is reset does.
 const loseGraphics = (page, ms) => page.evaluate(async (time) => {
@@ -103,6 +110,7 @@ test('a line that something on the way cuts again and again is taken up each tim
   const line = await cutting(daemon.web);
   const {page, faults} = await inside('', {port: line.port});
   for (let round = 2; round < 5; ++round) {
+    await page.evaluate(() => (globalThis.said = []));
     line.cut();
     await noticeSays(page, /Connection lost; the picture stays/);
     const gone = await status(page);
@@ -138,6 +146,43 @@ test('a page that the browser puts away lets its session go, and has one again o
   await page.evaluate(() => dispatchEvent(new PageTransitionEvent('pageshow', {persisted: true})));
   await until(page, (s) => s.joins === 2 && s.streamFrames > before.streamFrames, 60, 'the stream again');
   assert.deepEqual((await status(page)).view, before.view);
+  await page.context().close();
+});
+
+// Pages of a browser without a screen are never hidden: the document is made to say so.
+const look = (page, visibility) => page.evaluate((state) => {
+  Object.defineProperty(document, 'visibilityState', {value: state, configurable: true});
+  document.dispatchEvent(new Event('visibilitychange'));
+}, visibility);
+const sessions = async () => (await (await fetch(`http://127.0.0.1:${daemon.web}/healthz`)).json()).sessions;
+
+test('a page that nobody sees costs the server nothing after a while, and goes on where it was when it is seen', async () => {
+  const {page, faults} = await inside(linkOf('hall'));
+  await until(page, (s) => s.finest, 60, 'the picture at its finest');
+  const asked = [];
+  page.on('request', (request) => asked.push(request.url()));
+  await look(page, 'hidden');
+  await page.waitForTimeout(3000);
+  assert.equal(await sessions(), 1, 'a look at another page costs nobody a session');
+  for (const end = Date.now() + 30_000; await sessions() > 0;) {
+    assert.ok(Date.now() < end, 'the session is given up');
+    await page.waitForTimeout(200);
+  }
+  await page.waitForTimeout(1000);
+  const gone = await status(page);
+  await page.waitForTimeout(2000);
+  assert.equal((await status(page)).received, gone.received, 'nothing comes any more');
+  const kept = await picture(page);
+  assert.ok(new Set(kept.data).size > 50, 'the picture is still there');
+  await look(page, 'visible');
+  assert.ok(changed(kept, await picture(page)) < 15, 'and at once when it is seen');
+  const back = await until(page, (s) => s.joins === 2 && s.streamFrames > gone.streamFrames, 60, 'the stream again');
+  assert.deepEqual(back.view, gone.view);
+  assert.ok(back.received - gone.received < gone.received, 'the scene is not sent again');
+  assert.deepEqual(await page.evaluate(() => globalThis.said), [], 'and nothing is said of it');
+  assert.ok(await notReloaded(page));
+  assert.deepEqual(asked, []);
+  assert.deepEqual(faults, []);
   await page.context().close();
 });
 

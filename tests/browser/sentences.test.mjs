@@ -34,6 +34,38 @@ test('outside of a secure context the way to HTTPS is shown, with the view', asy
   await daemon.stop();
 });
 
+// What moves in a scene, or shows something of it.
+const kHands = ['scene', 'mode', 'share', 'show-panel', 'show-help'];
+
+// Neither by a hand nor, going round once, by the keyboard.
+async function nothingToPress(page) {
+  for (let i = 0; i < 8; ++i) {
+    await page.keyboard.press('Tab');
+    const id = await page.evaluate(() => document.activeElement?.id);
+    assert.ok(!kHands.includes(id), `${id} does nothing here`);
+  }
+  for (const id of kHands.slice(1)) assert.ok(await page.locator(`#${id}`).isHidden(), id);
+}
+
+test('a server without HTTPS offers none, but says how to get in', async () => {
+  const config = join(state.path, 'no_tls.toml');
+  writeFileSync(config, '[tls]\nenabled = false\n');
+  const daemon = await serve(state.path, {more: ['--q', '16', '--config', config]});
+  const context = await browser.newContext(small);
+  const page = await context.newPage();
+  await page.goto(`http://darm.test:${daemon.web}/`);
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  assert.match(await alert.innerText(), new RegExp(`no HTTPS: open http://localhost:${daemon.web}/ on its own machine`));
+  assert.equal(await page.getByRole('link').count(), 0);
+  await page.setViewportSize({width: 240, height: 120});
+  const {y, height} = await alert.boundingBox();
+  assert.ok(y >= 0 && y + height <= 120, 'where it does not fit it scrolls');
+  await nothingToPress(page);
+  await context.close();
+  await daemon.stop();
+});
+
 test('without WebGL 2 the way out is named', async () => {
   const daemon = await serve(state.path, {more: ['--q', '16']});
   const context = await browser.newContext(small);
@@ -46,6 +78,27 @@ test('without WebGL 2 the way out is named', async () => {
   });
   await page.goto(`http://127.0.0.1:${daemon.web}/`);
   assert.match(await page.getByRole('alert').innerText(), /no WebGL 2.*turn on hardware acceleration/);
+  await nothingToPress(page);
+  await context.close();
+  await daemon.stop();
+});
+
+test('a scene that cannot be drawn is said, and leaves no buttons that do nothing', async () => {
+  const daemon = await serve(state.path, {more: ['--q', '16']});
+  const context = await browser.newContext(small);
+  const page = await context.newPage();
+  await page.addInitScript(() => {
+    // A driver that takes no shader.
+    const real = WebGL2RenderingContext.prototype.shaderSource;
+    WebGL2RenderingContext.prototype.shaderSource = function (shader) {
+      real.call(this, shader, 'no shader');
+    };
+  });
+  await page.goto(`http://127.0.0.1:${daemon.web}/`);
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  assert.match(await alert.innerText(), /cannot be drawn here.*another browser/);
+  await nothingToPress(page);
   await context.close();
   await daemon.stop();
 });

@@ -143,13 +143,13 @@ test('everything can be reached by keys, is labelled and can be read', async () 
   const context = await browser.newContext({...small, reducedMotion: 'reduce'});
   const {page} = await visit(context);
   await until(page, (s) => s.firstPictureMs !== null, 30, 'a picture');
-  for (const name of ['Walk', 'Link', 'Numbers']) await page.getByRole('button', {name}).waitFor();
+  for (const name of ['Walk', 'Link', 'Numbers', 'Help']) await page.getByRole('button', {name}).waitFor();
   const reached = [];
   for (let i = 0; i < 5; ++i) {
     await page.keyboard.press('Tab');
     reached.push(await page.evaluate(() => document.activeElement?.id ?? ''));
   }
-  for (const id of ['scene', 'mode', 'share', 'show-panel']) assert.ok(reached.includes(id), `${id} in ${reached}`);
+  for (const id of ['scene', 'mode', 'share', 'show-panel', 'show-help']) assert.ok(reached.includes(id), `${id} in ${reached}`);
   await page.getByRole('button', {name: 'Numbers'}).focus();
   await page.keyboard.press('Enter');
   const panel = page.getByRole('region', {name: 'Measurements'});
@@ -162,7 +162,7 @@ test('everything can be reached by keys, is labelled and can be read', async () 
     const numbers = (text) => text.match(/[\d.]+/g).map(Number);
     const light = (rgb) => rgb.map((c) => c / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
       .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
-    return [...document.querySelectorAll('button, #panel')].map((element) => {
+    return [...document.querySelectorAll('button, #panel, #help, #notice, #alert')].map((element) => {
       const style = getComputedStyle(element);
       const [r, g, b, a = 1] = numbers(style.backgroundColor);
       const ground = light([r, g, b].map((c) => c * a + 255 * (1 - a)));

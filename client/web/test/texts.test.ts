@@ -6,17 +6,31 @@ import {axisOf} from '../src/page/input.js';
 import {lines} from '../src/page/panel.js';
 import {residencyOf} from '../src/page/residency.js';
 import {whatIsMissing} from '../src/page/requirements.js';
+import {secureWay} from '../src/page/secure_way.js';
 import {meaningOf, retryDelay} from '../src/worker/stream_socket.js';
 import {codecOf, splitChroma} from '../src/worker/video_decoder.js';
 
 test('what is missing is said with the way out', () => {
-  const all = {secure: true, webCodecs: true, webGl2: true, webAssembly: true, href: 'http://host:9080/#view=1,2,3,4,5,60'};
+  const all = {secure: true, webCodecs: true, webGl2: true, webAssembly: true, href: 'http://host:9080/#view=1,2,3,4,5,60',
+    httpsPort: 9080};
   assert.equal(whatIsMissing(all), null);
   const insecure = whatIsMissing({...all, secure: false, webCodecs: false});
   assert.equal(insecure?.link?.href, 'https://host:9080/#view=1,2,3,4,5,60', 'the view is kept');
   assert.match(whatIsMissing({...all, webCodecs: false})!.text, /WebCodecs.*use a current/);
   assert.match(whatIsMissing({...all, webGl2: false})!.text, /WebGL 2.*hardware acceleration/);
   assert.match(whatIsMissing({...all, webAssembly: false})!.text, /WebAssembly.*allow it/);
+});
+
+test('HTTPS is offered where it is, and nowhere else', () => {
+  assert.equal(secureWay('http://host/#view=1,2,3,4,5,60', 80).link?.href, 'https://host:80/#view=1,2,3,4,5,60');
+  const without = secureWay('http://host:9080/', 0);
+  assert.equal(without.link, undefined);
+  assert.match(without.text, /no HTTPS: open http:\/\/localhost:9080\/ on its own machine.*tls\.enabled.*reverse proxy/);
+  for (const port of [9080, null]) {
+    const between = secureWay('http://scene.example/', port);
+    assert.equal(between.link, undefined, 'what stands between page and server need not speak it');
+    assert.match(between.text, /ask who runs this server for its HTTPS address/);
+  }
 });
 
 test('a goodbye says whether to come again', () => {

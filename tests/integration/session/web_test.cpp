@@ -45,6 +45,8 @@ class WebTest : public SessionWorld {
     options.files = kFiles;
     options.tls = tls;
     web = WebListener::open(io, system, around, options).value();
+    options.tls = nullptr;
+    without_tls = WebListener::open(io, system, around, options).value();
     TcpListenerOptions tcp_options;
     tcp_options.address = "127.0.0.1";
     tcp_options.tls = tls;
@@ -53,6 +55,7 @@ class WebTest : public SessionWorld {
   }
   ~WebTest() override {
     web->stop();
+    without_tls->stop();
     bare->stop();
     finish();
     std::filesystem::remove_all(folder);
@@ -76,7 +79,10 @@ class WebTest : public SessionWorld {
     return parser.release();
   }
   http::response<http::string_body> ask_once(const std::string& text, bool head = false) {
-    auto socket = connect(web->port());
+    return ask_once(*web, text, head);
+  }
+  http::response<http::string_body> ask_once(WebListener& listener, const std::string& text, bool head = false) {
+    auto socket = connect(listener.port());
     buffer.clear();
     return ask(socket, text, head);
   }
@@ -135,7 +141,7 @@ class WebTest : public SessionWorld {
   std::filesystem::path folder;
   asio::io_context client_io;
   beast::flat_buffer buffer;
-  std::unique_ptr<WebListener> web;
+  std::unique_ptr<WebListener> web, without_tls;
   std::unique_ptr<TcpListener> bare;
 };
 
@@ -163,6 +169,13 @@ TEST_F(WebTest, health_counts_the_sessions) {
   ASSERT_TRUE(enter(socket));
   EXPECT_NE(ask_once("GET /healthz HTTP/1.1\r\nHost: a\r\n\r\n").body().find("\"sessions\":1,\"max_sessions\":2"),
             std::string::npos);
+}
+
+TEST_F(WebTest, health_says_whether_there_is_https_and_where) {
+  const std::string request = "GET /healthz HTTP/1.1\r\nHost: a\r\n\r\n";
+  const auto with = ask_once(request).body(), without = ask_once(*without_tls, request).body();
+  EXPECT_NE(with.find("\"https_port\":" + std::to_string(web->port()) + "}"), std::string::npos) << with;
+  EXPECT_NE(without.find("\"https_port\":0}"), std::string::npos) << without;
 }
 
 TEST_F(WebTest, rude_requests_hear_why) {

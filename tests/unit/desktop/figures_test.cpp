@@ -39,6 +39,19 @@ TEST(Figures, ThePanelTellsNumbersWithTheirUnits) {
   EXPECT_EQ(lines.at("Cost"), "3.2 MB (115.2 MB an hour), ms: decoding 6, uploading 2, drawing 4");
 }
 
+TEST(Figures, InFewWordsItTellsTheSame) {
+  Measured m;
+  m.frames_per_second = 20;
+  m.divisor = 2;
+  m.bits_per_second = 1.62e6;
+  m.lag_ms = 132.4;
+  m.error = 0.01;
+  const PanelLines lines = {
+      {"Frames/s", "20, coarser"}, {"Stream", "1.6 Mbit/s"}, {"Lag", "132 ms"}, {"Error", "2.55 of 255"}};
+  EXPECT_EQ(brief_lines(m), lines);
+  EXPECT_EQ(brief_lines(Measured{}).back()[1], "-");
+}
+
 TEST(Figures, WhatIsNotKnownIsNotSaid) {
   const auto lines = said(Measured{});
   EXPECT_EQ(lines.at("Frames a second"), "still");

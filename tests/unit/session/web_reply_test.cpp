@@ -100,9 +100,9 @@ TEST(WebReply, every_answer_carries_the_security_headers) {
 }
 
 TEST(WebReply, health_is_told_in_numbers) {
-  const auto well = answer({"GET", "/healthz", "", "", false}, kFiles, {true, 3, 64});
+  const auto well = answer({"GET", "/healthz", "", "", false}, kFiles, {true, 3, 64, 9080});
   EXPECT_EQ(well.status, 200u);
-  EXPECT_EQ(well.text, "{\"status\":\"ok\",\"protocol\":2,\"sessions\":3,\"max_sessions\":64}\n");
+  EXPECT_EQ(well.text, "{\"status\":\"ok\",\"protocol\":2,\"sessions\":3,\"max_sessions\":64,\"https_port\":9080}\n");
   EXPECT_EQ(header(well, "Cache-Control"), "no-store");
   EXPECT_EQ(answer({"GET", "/healthz", "", "", false}, kFiles, {false, 0, 64}).status, 503u);
 }

@@ -9,6 +9,8 @@ const kKeys: Record<string, Vec3> = {
 };
 const kTurnKeys: Record<string, number> = {ArrowLeft: 1, ArrowRight: -1};
 const kLookKeys: Record<string, number> = {KeyR: 1, KeyF: -1};
+/** Where the focus is in something that scrolls, these scroll it. */
+const kScrollKeys = new Set(['ArrowUp', 'ArrowDown', 'ArrowLeft', 'ArrowRight', 'PageUp', 'PageDown']);
 const kTurnSpeed = 1.2;        // radians a second, by key
 const kStickTurnSpeed = 2.2;   // radians a second, stick fully over
 const kDeadZone = 0.15;
@@ -19,6 +21,12 @@ export function axisOf(value: number | undefined): number {
   const v = value !== undefined && Number.isFinite(value) ? value : 0;
   const beyond = Math.max(0, Math.abs(v) - kDeadZone) / (1 - kDeadZone);
   return Math.sign(v) * Math.min(1, beyond);
+}
+
+// A sheet over the picture has all keys.
+function goesElsewhere(e: KeyboardEvent): boolean {
+  if (document.querySelector('dialog[open]') !== null) return true;
+  return kScrollKeys.has(e.code) && e.target instanceof Element && e.target.closest('[data-scrolls]') !== null;
 }
 
 export interface InputOwner {
@@ -87,7 +95,7 @@ export class Input {
   }
 
   private key(e: KeyboardEvent): void {
-    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    if (e.ctrlKey || e.metaKey || e.altKey || goesElsewhere(e)) return;
     // A button that was pressed keeps Enter and Space; none of these means anything to it.
     if (!(e.code in kKeys) && !(e.code in kTurnKeys) && !(e.code in kLookKeys) && !e.code.startsWith('Shift')) return;
     this.held.add(e.code);

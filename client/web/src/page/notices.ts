@@ -3,15 +3,22 @@ import type {Sentence} from './requirements.js';
 
 export class Notices {
   private hideTimer = 0;
+  private standing = '';  // said until something else is so
 
   constructor(private readonly quietLine: HTMLElement, private readonly alertBox: HTMLElement) {}
 
-  /** A line at the edge; the picture goes on. Empty: nothing to say. `seconds`: it leaves by itself. */
+  /** A line at the edge; the picture goes on. Empty: nothing to say. `seconds`: then what was said before is said again. */
   quiet(text: string, seconds = 0): void {
     clearTimeout(this.hideTimer);
-    if (this.quietLine.textContent !== text) this.quietLine.textContent = text;
+    if (seconds > 0) this.hideTimer = self.setTimeout(() => this.say(this.standing), seconds * 1000);
+    else this.standing = text;
+    this.say(text);
+  }
+
+  // Shown first and written then: what speaks for the page reads out what changes in a line that is there.
+  private say(text: string): void {
     this.quietLine.hidden = text === '';
-    if (seconds > 0) this.hideTimer = window.setTimeout(() => this.quiet(''), seconds * 1000);
+    if (this.quietLine.textContent !== text) this.quietLine.textContent = text;
   }
 
   /** The reason why there is no picture, and the way out. */

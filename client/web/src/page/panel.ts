@@ -62,6 +62,7 @@ export function lines(m: Measured): Record<string, string> {
 export class Panel {
   constructor(private readonly root: HTMLElement, private readonly button: HTMLElement) {
     this.show(false);
+    window.addEventListener('resize', () => this.fit());
   }
 
   get open(): boolean {
@@ -71,6 +72,7 @@ export class Panel {
   show(open: boolean): void {
     this.root.hidden = !open;
     this.button.setAttribute('aria-expanded', String(open));
+    this.fit();
   }
 
   update(measured: Measured): void {
@@ -78,5 +80,12 @@ export class Panel {
       const place = this.root.querySelector(`[data-line="${name}"]`);
       if (place !== null && place.textContent !== text) place.textContent = text;
     }
+    this.fit();
+  }
+
+  // A stop for the keyboard only where there is something to scroll.
+  private fit(): void {
+    if (this.root.scrollHeight > this.root.clientHeight) this.root.tabIndex = 0;
+    else if (document.activeElement !== this.root) this.root.removeAttribute('tabindex');
   }
 }

@@ -1,4 +1,5 @@
 // What a browser must have, and what to tell who has it not: one sentence with the way out.
+import {secureWay} from './secure_way.js';
 
 export interface Sentence {
   text: string;
@@ -15,24 +16,13 @@ export interface Surroundings {
   webAssembly: boolean;
   /** The page's address. */
   href: string;
-}
-
-export function httpsOf(href: string): string {
-  const url = new URL(href);
-  url.protocol = 'https:';
-  return url.href;
+  /** Where its server speaks HTTPS; 0: nowhere; null: not known. Matters where the context is not secure. */
+  httpsPort: number | null;
 }
 
 /** Null: everything is there. */
 export function whatIsMissing(here: Surroundings): Sentence | null {
-  if (!here.webCodecs && !here.secure) {
-    const href = httpsOf(here.href);
-    return {
-      text: 'Browsers decode the picture over a secure connection only: open this page by HTTPS (the browser may ask ' +
-            "whether you trust this server's own certificate).",
-      link: {href, label: new URL(href).host + ' over HTTPS'},
-    };
-  }
+  if (!here.webCodecs && !here.secure) return secureWay(here.href, here.httpsPort);
   if (!here.webCodecs) {
     return {text: 'This browser cannot decode the picture (it has no WebCodecs): please use a current Chrome, Edge, ' +
                   'Safari or Firefox.'};

@@ -5,6 +5,7 @@ import {fromHash} from './link.js';
 import {toPose} from './camera.js';
 import {Notices} from './notices.js';
 import {whatIsMissing} from './requirements.js';
+import {askHttpsPort} from './secure_way.js';
 
 declare const WORKER_NAME: string;  // the worker's file, by tools/build.mjs
 
@@ -34,9 +35,12 @@ async function start(): Promise<void> {
   const canvas = element('scene') as HTMLCanvasElement;
   const gl = canvas.getContext('webgl2', {alpha: false, antialias: false, depth: false, stencil: false,
     powerPreference: 'high-performance'});
-  const missing = whatIsMissing({secure: window.isSecureContext, webCodecs: 'VideoDecoder' in window,
-    webGl2: gl !== null, webAssembly: typeof WebAssembly === 'object', href: location.href});
+  const secure = window.isSecureContext;
+  const missing = whatIsMissing({secure, webCodecs: 'VideoDecoder' in window, webGl2: gl !== null,
+    webAssembly: typeof WebAssembly === 'object', href: location.href,
+    httpsPort: secure ? null : await askHttpsPort(location.href)});
   if (missing !== null || gl === null) {
+    element('stage').hidden = true;  // nothing in it can be used
     if (missing !== null) notices.alert(missing);
     return;
   }
@@ -59,6 +63,7 @@ async function start(): Promise<void> {
 }
 
 start().catch((error: unknown) => {
+  element('stage').hidden = true;
   const alert = element('alert');
   alert.textContent = `The page could not start (${String(error)}): please reload it.`;
   alert.hidden = false;

@@ -1,16 +1,21 @@
 // One visit: ties the stream, the renderer, the camera and the page's few buttons together.
 import type {Answer, FromWorker, LagStages, OutReason, Pose, ToWorker, Traffic} from '../shared/messages.js';
 import type {Chunk, FrameUpdate, Planes, SceneShape, StreamShape} from '../shared/scene.js';
+import type {ButtonsOwner} from './buttons.js';
+import {Buttons} from './buttons.js';
 import type {View} from './camera.js';
 import {forward, fromPose, right, toPose, up} from './camera.js';
 import {DrawTimer} from './draw_timer.js';
 import type {Gl} from './gl_resources.js';
+import {Help} from './help.js';
 import type {InputOwner} from './input.js';
 import {Input} from './input.js';
 import {fromHash, toHash} from './link.js';
 import type {Notices} from './notices.js';
 import {Panel} from './panel.js';
 import {pick} from './pick.js';
+import type {PresenceOwner} from './presence.js';
+import {watchPresence} from './presence.js';
 import {FrameGuard, kUnknownDevice} from './quality.js';
 import {Renderer} from './renderer.js';
 import type {Residency} from './residency.js';
@@ -60,10 +65,11 @@ export interface Cost {
   level: number;
 }
 
-export class Visit implements InputOwner {
+export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
   rig: Rig;
   private readonly input: Input;
   private readonly panel: Panel;
+  private readonly buttons: Buttons;
   private readonly guard = new FrameGuard();
   private readonly timer: DrawTimer;
   private counter: ResidencyCounter;
@@ -75,6 +81,7 @@ export class Visit implements InputOwner {
   private chunks: Chunk[] = [];
   private chunksInView = 0;
   private coarse: Planes | null = null;
+  private away = false;  // of its own accord: nothing is lost
   private placedView: boolean;  // by the link or by hand: the server's start does not move it
   private loop = 0;
   private dirty = true;
@@ -109,18 +116,12 @@ export class Visit implements InputOwner {
     this.timer = new DrawTimer(gl);
     this.counter = new ResidencyCounter(gl);
     this.input = new Input(canvas, this);
-    const panelButton = document.getElementById('show-panel')!;
-    this.panel = new Panel(document.getElementById('panel')!, panelButton);
-    panelButton.addEventListener('click', () => this.togglePanel());
-    document.getElementById('mode')!.addEventListener('click', () => this.toggleMode());
-    document.getElementById('share')!.addEventListener('click', () => void this.share());
-    window.addEventListener('keydown', (e) => this.key(e));
+    this.panel = new Panel(document.getElementById('panel')!, document.getElementById('show-panel')!);
+    const help = new Help(document.getElementById('help') as HTMLDialogElement, document.getElementById('show-help')!);
+    this.buttons = new Buttons(this, help, notices);
     window.addEventListener('resize', () => this.redraw());
     window.addEventListener('hashchange', () => this.followLink());
-    window.addEventListener('pagehide', () => this.say({type: 'close'}));
-    window.addEventListener('pageshow', (e) => {
-      if (e.persisted) this.say({type: 'resume'});  // kept by the browser, and gone back to
-    });
+    watchPresence(this);
     canvas.addEventListener('webglcontextlost', (e) => {
       e.preventDefault();
       this.loseGraphics();
@@ -153,6 +154,23 @@ export class Visit implements InputOwner {
     if (distance !== null) this.rig.pivot = plus(view.position, scaled(unit, distance));
   }
 
+  // ---- coming and going ----------------------------------------------------------------------------------------------
+
+  sceneIsHere(): boolean {
+    return this.scene !== null && this.chunks.length >= this.scene.chunkCount;
+  }
+
+  leave(): void {
+    this.away = true;
+    this.status.joined = false;
+    this.say({type: 'close'});
+  }
+
+  comeBack(): void {
+    this.say({type: 'resume'});
+    this.redraw();
+  }
+
   private say(message: ToWorker, transfer: Transferable[] = []): void {
     this.worker.postMessage(message, transfer);
   }
@@ -182,9 +200,10 @@ export class Visit implements InputOwner {
   }
 
   private join(m: Extract<FromWorker, {type: 'joined'}>): void {
-    if (this.status.joins > 0) this.notices.quiet('Connected again.', 3);
-    else this.notices.quiet('');
+    this.notices.quiet('');
+    if (this.status.joins > 0 && !this.away) this.notices.quiet('Connected again.', 3);
     this.notices.calm();
+    this.away = false;
     ++this.status.joins;
     this.status.joined = true;
     this.shapeNew = m.shape.size !== this.shape.size || m.shape.viewSize !== this.shape.viewSize;
@@ -219,7 +238,7 @@ export class Visit implements InputOwner {
     } else if (this.status.joins > 1) {
       Object.assign(this.rig, {mode, pivot});
     }
-    this.showMode();
+    this.buttons.showMode(this.rig.mode);
     this.makeRenderer(scene);
   }
 
@@ -229,6 +248,7 @@ export class Visit implements InputOwner {
       this.renderer = new Renderer(this.gl, scene, this.shape);
       for (const chunk of this.chunks) this.renderer.addChunk(chunk);
       if (this.coarse) this.renderer.putCoarse(this.coarse);
+      this.buttons.offer(true);
     } catch (error) {
       this.failToDraw(error);
     }
@@ -237,6 +257,7 @@ export class Visit implements InputOwner {
 
   private failToDraw(error: unknown): void {
     this.renderer = null;
+    this.buttons.offer(false);
     const why = error instanceof Error ? error.message : String(error);
     this.notices.alert({text: `The scene cannot be drawn here (${why}): please try another browser or device.`});
   }
@@ -256,7 +277,7 @@ export class Visit implements InputOwner {
     if (this.scene !== null) this.makeRenderer(this.scene);
     this.say({type: 'key frames'});
     this.notices.calm();
-    this.notices.quiet(this.status.joined ? '' : kLostLine);
+    this.notices.quiet(this.status.joined || this.away ? '' : kLostLine);
   }
 
   // Frames of the private layer say nothing of it: -1.
@@ -287,6 +308,8 @@ export class Visit implements InputOwner {
 
   private out(reason: OutReason, text: string, retryMs: number): void {
     this.status.joined = false;
+    this.away = false;
+    if (retryMs < 0) this.buttons.offer(this.status.firstPictureMs !== null && this.renderer !== null);
     if (reason === 'lost') {
       this.notices.calm();
       this.notices.quiet(this.renderer === null ? `${text} Trying again…` : kLostLine);
@@ -437,35 +460,21 @@ export class Visit implements InputOwner {
       resolutionError: this.status.resolutionError, seconds: now / 1000});
   }
 
-  // ---- buttons, keys, the link ---------------------------------------------------------------------------------------
+  // ---- what buttons and keys ask for ---------------------------------------------------------------------------------
 
-  private key(e: KeyboardEvent): void {
-    if (e.ctrlKey || e.metaKey || e.altKey || e.repeat) return;
-    if (e.code === 'KeyP') this.togglePanel();
-    else if (e.code === 'KeyO') this.toggleMode();
-    else if (e.code === 'KeyH') document.body.classList.toggle('bare');
-  }
-
-  private togglePanel(): void {
+  togglePanel(): void {
     this.panel.show(!this.panel.open);
     this.panelAt = 0;
     this.wake();
   }
 
-  private toggleMode(): void {
+  toggleMode(): void {
     this.rig.mode = this.rig.mode === 'walk' ? 'orbit' : 'walk';
     if (this.rig.mode === 'orbit') this.pickPivot(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
-    this.showMode();
+    this.buttons.showMode(this.rig.mode);
   }
 
-  private showMode(): void {
-    const orbit = this.rig.mode === 'orbit';
-    const button = document.getElementById('mode')!;
-    button.textContent = orbit ? 'Orbit' : 'Walk';
-    button.setAttribute('aria-label', orbit ? 'Moving: orbit' : 'Moving: walk');
-  }
-
-  private writeLink(): void {
+  writeLink(): void {
     history.replaceState(null, '', toHash(this.rig.view));
   }
 
@@ -476,16 +485,6 @@ export class Visit implements InputOwner {
     this.rig.view = view;
     this.placedView = true;
     this.moved();
-  }
-
-  private async share(): Promise<void> {
-    if (this.status.joins > 0) this.writeLink();
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.notices.quiet('The link to this view is copied.', 3);
-    } catch {
-      this.notices.quiet('The link to this view is in the address bar.', 5);
-    }
   }
 }
 
