@@ -82,8 +82,10 @@ int run(const AccuracyCommand& command) {
   if (command.json) {
     std::printf("%s", accuracy::json_text(study->report).c_str());
   } else {
-    std::printf("%s: %zu measured, %zu from before\n", (command.out / "accuracy.html").c_str(), study->measured,
+    std::printf("%s: %zu measured, %zu from before", (command.out / "accuracy.html").c_str(), study->measured,
                 study->kept);
+    if (study->left_out > 0) std::printf(", %zu left out", study->left_out);
+    std::printf("\n");
   }
   if (!study->stopped) return 0;
   std::fprintf(stderr, "darmd accuracy: interrupted; the same command goes on where it stopped\n");

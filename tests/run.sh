@@ -30,7 +30,7 @@ configure() {
     { cat build/release.configure.log; return 1; }
 }
 build() {
-  NINJA_STATUS='[release %f/%t %es] ' ninja -C build/release
+  NINJA_STATUS='[release %f/%t %es] ' ninja -C build/release all benches
 }
 # promtool alone: its package would start a Prometheus at the port where darmd has its metrics.
 fetch_promtool() {

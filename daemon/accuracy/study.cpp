@@ -97,6 +97,7 @@ class Runner {
   Kept kept_;
   std::vector<std::string> blind_;  // cameras that see nothing
   bool alone_ = false;              // there is one camera
+  std::string why_left_out_;        // the last one
   Study study_;
 };
 
@@ -148,6 +149,8 @@ Result<void> Runner::measure_view(const NamedView& view, const std::vector<Varia
     if (!outcome) return std::unexpected(outcome.error().within(view.name + ": " + variant.name));
     if (!outcome->impossible.empty()) {
       progress_.warn(view.name + ": " + variant.name + " is left out: " + outcome->impossible);
+      ++study_.left_out;
+      why_left_out_ = outcome->impossible;
       continue;
     }
     if (!outcome->measurement) {
@@ -211,6 +214,8 @@ Result<Study> Runner::run() {
   }
   if (blind_.size() == views->size())
     return fail((alone_ ? "" : "no camera is left: ") + blind_words(blind_.front()) + "; name another with --cameras");
+  if (study_.left_out > 0 && study_.measured + study_.kept == 0 && !study_.stopped)
+    return fail("nothing was measured: " + why_left_out_);
   collect(*views, all);
   return std::move(study_);
 }

@@ -35,11 +35,9 @@ using TexelName = std::pair<TileId, int>;
 
 std::vector<TexelName> pick_texels(const LitView& view, std::size_t count) {
   std::vector<TexelName> seen;
-  view.set.for_each_use([&](TileId tile, const tile_scheduler::TileUse& use) {
+  for (const auto& [tile, mask] : sharp_texels(view))
     for (int t = 0; t < kTileTexels; ++t)
-      if (use.sharp.test(t)) seen.emplace_back(tile, t);
-  });
-  std::sort(seen.begin(), seen.end());
+      if (mask.test(t)) seen.emplace_back(tile, t);
   std::shuffle(seen.begin(), seen.end(), std::mt19937(7));
   seen.resize(std::min(seen.size(), count));
   std::sort(seen.begin(), seen.end());

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -36,6 +37,15 @@ struct LitView {
   std::vector<tile_scheduler::WeightedChain> chains;
   tile_scheduler::ImageStore images{std::size_t{8} << 30};
 };
+
+/// Tiles that the view reads at their sharp level, with the texels.
+inline std::map<TileId, TexelMask> sharp_texels(const LitView& view) {
+  std::map<TileId, TexelMask> out;
+  const auto& seen = view.set.current();
+  for (std::size_t i = 0; i < seen.tiles().size(); ++i)
+    if (!seen.uses()[i].sharp.empty()) out[seen.tiles()[i]] |= seen.uses()[i].sharp;
+  return out;
+}
 
 using TileMasks = std::unordered_map<TileId, TexelMask>;
 

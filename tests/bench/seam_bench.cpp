@@ -107,10 +107,7 @@ class PlaceFinder {
 
 // As many texels beside borders as elsewhere, of random tiles.
 std::vector<Truth> pick_texels(const LitView& view, std::size_t tiles, std::size_t count, std::uint32_t seed) {
-  std::map<TileId, TexelMask> seen;
-  view.set.for_each_use([&](TileId tile, const tile_scheduler::TileUse& use) {
-    if (!use.sharp.empty()) seen[tile] |= use.sharp;
-  });
+  const auto seen = sharp_texels(view);
   std::vector<std::pair<TileId, TexelMask>> chosen(seen.begin(), seen.end());
   std::mt19937 random(seed);
   std::shuffle(chosen.begin(), chosen.end(), random);

@@ -14,6 +14,7 @@
 #include "actors/tile_scheduler/view_demand.hpp"
 #include "actors/tile_scheduler/view_job.hpp"
 #include "actors/tile_scheduler/view_report.hpp"
+#include "actors/tile_scheduler/working_set.hpp"
 
 namespace {
 

@@ -24,9 +24,9 @@ class Accuracy(unittest.TestCase):
         self.addCleanup(folder.__exit__)
         self.out = self.folder / "out"
 
-    def command(self, *more, cameras=("hall",), state=None):
-        return [BIN / "darmd", "accuracy", "--config", SET_UP, "--cameras", *cameras, "--size", "128x72", "--q", "16",
-                "--seconds", "2", "--reference-psnr", "33", "--state-dir", state or self.state, "--out", self.out,
+    def command(self, *more, cameras=("hall",), state=None, size="128x72", seconds="2"):
+        return [BIN / "darmd", "accuracy", "--config", SET_UP, "--cameras", *cameras, "--size", size, "--q", "16",
+                "--seconds", seconds, "--reference-psnr", "33", "--state-dir", state or self.state, "--out", self.out,
                 *more]
 
     def study(self, *more):
@@ -139,6 +139,19 @@ class Accuracy(unittest.TestCase):
         report = json.loads((self.out / "accuracy.json").read_text())
         self.assertEqual([c["name"] for c in report["cameras"]], ["hall"])
         self.assertEqual({m["camera"] for m in report["measurements"]}, {"hall"})
+
+    def test_a_study_that_measures_nothing_has_failed(self):
+        # A full picture at 720p and this density takes three times the half second on two cores.
+        command = self.command("--only", "reference", size="1280x720", seconds="0.5")
+        command[command.index("33")] = "15"
+        command[command.index("16")] = "64"
+        done = subprocess.run(command, capture_output=True, text=True, timeout=200)
+        if done.returncode == 0:
+            self.skipTest("this machine makes a full picture in half a second")
+        self.assertEqual(done.returncode, 1)
+        last = done.stderr.splitlines()[-1]
+        self.assertIn("nothing was measured", last)
+        self.assertIn("--seconds", last)
 
     def test_a_report_that_cannot_be_written_is_refused_before_the_work(self):
         state = self.folder / "state"

@@ -72,7 +72,7 @@ test('a stick at rest stays at rest', () => {
 });
 
 test('the panel tells numbers with their units', () => {
-  const said = lines({framesPerSecond: 58.6, drawMs: 4, level: 0, bitsPerSecond: 1.62e6, lagMs: 132.4, error: 0.01, resolutionError: 0.1,
+  const said = lines({framesPerSecond: 58.6, drawMs: 4, level: 0, bitsPerSecond: 1.62e6, lagMs: 132.4, error: 0.01, resolutionError: 0.1, omittedError: 0.05,
     lagStages: {network: 41, wait: 40, visibility: 10, shading: 1, encode: 20.2, queue: 0.1, decode: 8, display: 12.1},
     traffic: {received: 3.2e6, stream: 2e6, geometry: 1e6, coarse: 1e5, decodeMs: 6.2, framesLost: 0}, seconds: 100,
     residency: {sharp: 0.9, coarser: 0.06, coarseTex: 0.03, undefined: 0.01}});
@@ -81,5 +81,6 @@ test('the panel tells numbers with their units', () => {
   assert.equal(said['fallback'], '10 %');
   assert.equal(said['error'], '2.55 of 255 (40.0 dB)');
   assert.equal(said['resolution'], '25.50 of 255 (20.0 dB)');
+  assert.equal(said['omitted'], '12.75 of 255 (26.0 dB)');
   assert.match(said['cost']!, /^3\.2 MB \(115\.2 MB an hour\)/);
 });

@@ -18,6 +18,8 @@ export interface Measured {
   error: number | null;
   /** Beside it: for want of finer texels than the atlas has. */
   resolutionError: number;
+  /** Beside both: of reflections where they are not streamed. */
+  omittedError: number;
   seconds: number;
 }
 
@@ -54,6 +56,7 @@ export function lines(m: Measured): Record<string, string> {
     fallback: fallback === null ? '–' : percent(fallback),
     error: m.error === null || m.error < 0 ? '–' : errorText(m.error),
     resolution: errorText(m.resolutionError),
+    omitted: errorText(m.omittedError),
     cost: `${bytes(m.traffic.received)}${perHour}, decoding ${m.traffic.decodeMs.toFixed(0)} ms, ` +
           `drawing ${m.drawMs.toFixed(0)} ms`,
   };

@@ -1,5 +1,5 @@
 // One visit: ties the stream, the renderer, the camera and the page's few buttons together.
-import type {Answer, FromWorker, LagStages, OutReason, Pose, ToWorker, Traffic} from '../shared/messages.js';
+import type {Answer, FromWorker, LagStages, OutReason, Pose, ToWorker, Traffic, ViewErrors} from '../shared/messages.js';
 import type {Chunk, FrameUpdate, Planes, SceneShape, StreamShape} from '../shared/scene.js';
 import type {ButtonsOwner} from './buttons.js';
 import {Buttons} from './buttons.js';
@@ -47,6 +47,7 @@ export interface Status {
   view: View | null;
   error: number | null;
   resolutionError: number;
+  omittedError: number;
   lagMs: number | null;
   /** What it is made of. */
   lagStages: (LagStages & {display: number}) | null;
@@ -99,7 +100,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
     framesLost: 0};
   private residency: Residency | null = null;
   private status: Status = {firstPictureMs: null, bytesToFirstPicture: null, firstPictureBytes: null, framesDrawn: 0, streamFrames: 0,
-    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, resolutionError: 0, lagMs: null, lagStages: null, residency: null,
+    finest: false, joined: false, joins: 0, mode: 'walk', view: null, error: null, resolutionError: 0, omittedError: 0, lagMs: null, lagStages: null, residency: null,
     received: 0, cost: {drawMs: 0, decodeMs: 0, uploadMs: 0, level: 0}};
   private uploadMs = 0;
   private restoreTimer = 0;
@@ -190,10 +191,10 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
         this.renderer?.putCoarse(m.picture);
         return this.redraw();
       case 'frame':
-        this.noteError(m.error, m.resolutionError);
+        this.noteErrors(m.errors);
         return this.takeFrame(m.update, m.answer);
       case 'answer':
-        return this.noteError(m.error, m.resolutionError);
+        return this.noteErrors(m.errors);
       case 'traffic': return this.noteTraffic(m.traffic);
       case 'out': return this.out(m.reason, m.text, m.retryMs);
     }
@@ -280,11 +281,9 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
     this.notices.quiet(this.status.joined || this.away ? '' : kLostLine);
   }
 
-  // Frames of the private layer say nothing of it: -1.
-  private noteError(error: number, resolutionError: number): void {
-    if (!(error >= 0)) return;
-    this.status.error = error;
-    this.status.resolutionError = resolutionError;
+  private noteErrors(errors: ViewErrors | null): void {
+    if (errors === null) return;
+    Object.assign(this.status, {error: errors.light, resolutionError: errors.resolution, omittedError: errors.omitted});
   }
 
   private takeFrame(update: FrameUpdate, answer: Answer | null): void {
@@ -457,7 +456,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
       framesPerSecond: moving ? this.timer.framesPerSecond : null, drawMs: this.timer.lastMs, level: this.guard.level,
       bitsPerSecond: span > 0 ? ((last!.bytes - first!.bytes) * 8000) / span : 0, traffic: this.traffic,
       lagMs: this.status.lagMs, lagStages: this.status.lagStages, residency: this.residency, error: this.status.error,
-      resolutionError: this.status.resolutionError, seconds: now / 1000});
+      resolutionError: this.status.resolutionError, omittedError: this.status.omittedError, seconds: now / 1000});
   }
 
   // ---- what buttons and keys ask for ---------------------------------------------------------------------------------

@@ -59,6 +59,16 @@ export interface Traffic {
   framesLost: number;
 }
 
+/** Estimated RMS display errors of the view, 0..1. */
+export interface ViewErrors {
+  /** Of the light, and of reflections where they are streamed: more time mends it. */
+  light: number;
+  /** Beside it: for want of finer texels than the atlas has. */
+  resolution: number;
+  /** Beside both: of reflections where they are not streamed. */
+  omitted: number;
+}
+
 export type FromWorker =
   | {type: 'joined'; start: Pose; shape: StreamShape; updatesPerSecond: number; server: string; sceneKnown: boolean;
     /** The first so many chunks hold all that the first view can see. */
@@ -66,7 +76,8 @@ export type FromWorker =
   | {type: 'scene'; scene: SceneShape}
   | {type: 'chunk'; chunk: Chunk}
   | {type: 'coarse'; picture: Planes}
-  | {type: 'frame'; update: FrameUpdate; answer: Answer | null; error: number; resolutionError: number}
-  | {type: 'answer'; error: number; resolutionError: number}
+  /** `errors`: null with a frame of the private layer, which says nothing of them. */
+  | {type: 'frame'; update: FrameUpdate; answer: Answer | null; errors: ViewErrors | null}
+  | {type: 'answer'; errors: ViewErrors}
   | {type: 'traffic'; traffic: Traffic}
   | {type: 'out'; reason: OutReason; text: string; retryMs: number};

@@ -4,7 +4,7 @@ import {create} from '@bufbuild/protobuf';
 import {CameraUpdateSchema, FeedbackSchema, HelloSchema, PoseSchema} from '../gen/darm_pb.js';
 import type {CoarseTexture, SceneManifest, StreamFrame, Welcome} from '../gen/darm_pb.js';
 import {kMaxPhysTex, kMaxViewPhysTex, kProtocolVersion} from '../shared/limits.js';
-import type {FromWorker, OutReason, Pose, Traffic} from '../shared/messages.js';
+import type {FromWorker, OutReason, Pose, Traffic, ViewErrors} from '../shared/messages.js';
 import type {Planes, SceneShape, StreamShape} from '../shared/scene.js';
 import {BufferPool} from './buffer_pool.js';
 import {answerOf} from './lag.js';
@@ -25,6 +25,10 @@ function toWirePose(pose: Pose): ReturnType<typeof create<typeof PoseSchema>> {
   const [qx, qy, qz, qw] = pose.orientation;
   return create(PoseSchema, {position: {x, y, z}, qw, qx, qy, qz, fovy: pose.fovy, width: pose.width,
     height: pose.height});
+}
+
+function errorsOf(m: {error: number; resolutionError: number; omittedError: number}): ViewErrors {
+  return {light: m.error, resolution: m.resolutionError, omitted: m.omittedError};
 }
 
 export class Session implements SocketOwner {
@@ -146,7 +150,7 @@ export class Session implements SocketOwner {
       case 'frame': return this.takeFrame(this.player, body.value, true, receivedUs);
       case 'viewFrame': return this.takeFrame(this.viewPlayer, body.value, false, receivedUs);
       case 'noChange':
-        return this.post({type: 'answer', error: body.value.error, resolutionError: body.value.resolutionError});
+        return this.post({type: 'answer', errors: errorsOf(body.value)});
       default:  // a newer server may say more
     }
   }
@@ -226,8 +230,7 @@ export class Session implements SocketOwner {
       const transfer: Transferable[] = update.pages.map((rows) => rows.slots.buffer);
       if (update.picture) transfer.push(update.picture.buffer);
       const answer = shared ? answerOf(frame.stamps, receivedUs, sharedNowUs()) : null;
-      this.post({type: 'frame', update, answer, error: shared ? frame.error : -1,
-                 resolutionError: frame.resolutionError}, transfer);
+      this.post({type: 'frame', update, answer, errors: shared ? errorsOf(frame) : null}, transfer);
     }
     this.traffic.framesLost = (this.player?.framesLost ?? 0) + (this.viewPlayer?.framesLost ?? 0);
     this.repair();
