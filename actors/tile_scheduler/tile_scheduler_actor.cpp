@@ -131,6 +131,8 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
   const bool first = coarse_ == nullptr;
   coarse_ = std::move(message.picture);
   if (!first) return;
+  // Clients show it at once: what they are told next is of that.
+  for (auto& [id, stream] : streams_) estimate_errors(*stream, 0);
   for (auto& [id, session] : sessions_)
     if (session->view_layer) send_view_work(*session);
 }

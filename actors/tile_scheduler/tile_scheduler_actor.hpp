@@ -198,7 +198,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void send_work_soon();
 
   // What views are told of their errors.
-  void estimate_errors(Stream& stream);
+  void estimate_errors(Stream& stream, Microseconds apart = kErrorApart);
   void estimate_error(const Stream& stream, Session& session) const;
   [[nodiscard]] static float light_error(const Stream& stream);
   void tell_no_change(const ViewAnswer& answer);
@@ -259,6 +259,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void compose_view(Session& session);
 
   static constexpr Microseconds kWaitsEvery = 100'000;
+  static constexpr Microseconds kErrorApart = 30'000;  // of one session, for each other on its stream
   static constexpr int kMostReweighed = 20;  // by then a doubled pause is days
   static constexpr double kUsualKey = 1e6;   // bytes, until one was made
 

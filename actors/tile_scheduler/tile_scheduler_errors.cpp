@@ -6,16 +6,11 @@
 #include "actors/tile_scheduler/view_tone.hpp"
 
 namespace darm::tile_scheduler {
-namespace {
-
-constexpr Microseconds kErrorEvery = 30'000;
-
-}  // namespace
 
 // An error takes a millisecond to know: where many share a stream, each of theirs is looked at less often.
-void TileSchedulerActor::estimate_errors(Stream& stream) {
+void TileSchedulerActor::estimate_errors(Stream& stream, Microseconds apart) {
   const auto now = now_us();
-  const auto enough = kErrorEvery * static_cast<Microseconds>(stream.members.size() - 1);
+  const auto enough = apart * static_cast<Microseconds>(stream.members.size() - 1);
   for (auto* member : stream.members) {
     if (member->error_at && now - *member->error_at < enough) continue;
     member->error_at = now;
