@@ -260,8 +260,8 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
 
   static constexpr Microseconds kWaitsEvery = 100'000;
   static constexpr Microseconds kErrorApart = 30'000;  // of one session, for each other on its stream
-  static constexpr int kMostReweighed = 20;  // by then a doubled pause is days
-  static constexpr double kUsualKey = 1e6;   // bytes, until one was made
+  static constexpr int kMostReweighed = 20;            // by then a doubled pause is days
+  static constexpr double kUsualKey = 1e6;             // bytes, until one was made
 
   std::shared_ptr<const atlas::Layout> layout_;
   std::shared_ptr<const renderer::trace::RayScene> rays_;
