@@ -31,6 +31,8 @@ std::optional<Action> action_of(int key, bool control) {
       return Action::kPanel;
     case GLFW_KEY_O:
       return Action::kMode;
+    case GLFW_KEY_HOME:
+      return Action::kStart;
     case GLFW_KEY_H:
       return Action::kBare;
     case GLFW_KEY_L:

@@ -43,9 +43,9 @@ struct Arrivals {
 
 /// What is known of the view without a new picture.
 struct Answer {
-  std::optional<double> error;   ///< the newest estimate, of light
-  double resolution_error = 0;   ///< beside it: for want of finer texels than the atlas has
-  double omitted_error = 0;      ///< beside both: of light that depends on the eye and is not streamed
+  std::optional<double> error;             ///< the newest estimate, of light
+  std::optional<double> resolution_error;  ///< beside it: for want of finer texels than the atlas has
+  std::optional<double> omitted_error;     ///< beside both: of light that depends on the eye and is not streamed
   std::optional<double> lag_ms;  ///< from a camera sent until the server said that its picture needs no change
 };
 

@@ -21,7 +21,7 @@ constexpr ImGuiWindowFlags kPlain = ImGuiWindowFlags_NoDecoration | ImGuiWindowF
                                     ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                                     ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
 
-constexpr std::array<std::array<const char*, 2>, 15> kHelp = {{{"W A S D, arrows", "walk and turn"},
+constexpr std::array<std::array<const char*, 2>, 16> kHelp = {{{"W A S D, arrows", "walk and turn"},
                                                                {"Q, E", "down, up"},
                                                                {"R, F", "look up, down"},
                                                                {"Shift", "hurry"},
@@ -29,6 +29,7 @@ constexpr std::array<std::array<const char*, 2>, 15> kHelp = {{{"W A S D, arrows
                                                                {"Right drag", "ahead; orbit: across"},
                                                                {"Gamepad", "left walks, right looks"},
                                                                {"O", "walk or orbit"},
+                                                               {"Home", "where the scene begins"},
                                                                {"P", "measurements"},
                                                                {"H", "nothing but the scene"},
                                                                {"L", "copy a link to this view"},
@@ -179,8 +180,7 @@ Overlay::~Overlay() {
 
 bool Overlay::takes_mouse() const { return ImGui::GetIO().WantCaptureMouse; }
 
-std::vector<Action> Overlay::draw(const OverlayShow& show) {
-  std::vector<Action> clicked;
+void Overlay::lay_out(const OverlayShow& show, std::vector<Action>& clicked) {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
@@ -190,6 +190,15 @@ std::vector<Action> Overlay::draw(const OverlayShow& show) {
     if (show.panel) panel(show, bar, sheet);
   }
   words(show.bare ? Notice{"", show.notice.alert} : show.notice);
+}
+
+std::vector<Action> Overlay::draw(const OverlayShow& show) {
+  std::vector<Action> clicked;
+  // A box takes its size from what was in it the time before, and is hidden the first time: what is new would be cut, or
+  // not seen at all, until something else is drawn.
+  lay_out(show, clicked);
+  ImGui::EndFrame();
+  lay_out(show, clicked);
   ImGui::Render();
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   // The backend asks for state that OpenGL ES does not have.

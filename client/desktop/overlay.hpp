@@ -38,6 +38,7 @@ class Overlay {
 
  private:
   Overlay() = default;
+  static void lay_out(const OverlayShow& show, std::vector<Action>& clicked);
   bool glfw_ = false, gl_ = false;
 };
 

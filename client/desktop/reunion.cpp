@@ -8,6 +8,11 @@
 namespace darm::client::desktop {
 namespace {
 
+// With one mark at its end, whatever it has.
+std::string sentence(const std::string& text) {
+  return text.ends_with('?') || text.ends_with('!') || text.ends_with('.') ? text : text + ".";
+}
+
 constexpr double kFirstRetryMs = 300, kLongestRetryMs = 5000, kFullRetryMs = 10'000;
 
 }  // namespace
@@ -33,17 +38,18 @@ std::optional<double> Reunion::lost(const Error& reason, bool has_picture, doubl
       return kFullRetryMs;
     }
     case Cause::kVersion:
-      words_.alert = reason.message + ". Please use the darm-view that came with that server.";
+      words_.alert = sentence(reason.message) + " Please use the darm-view that came with that server.";
       return std::nullopt;
     case Cause::kRefused:
     case Cause::kProtocol:
-      words_.alert = reason.message + ". Please start darm-view again.";
+      words_.alert = sentence(reason.message) + " Please start darm-view again.";
       return std::nullopt;
     case Cause::kOther:
       break;
   }
   words_.quiet =
-      has_picture ? "Connection lost; the picture stays. Trying again..." : reason.message + ". Trying again...";
+      has_picture ? "Connection lost; the picture stays. Trying again..."
+                  : sentence(reason.message) + " Trying again...";
   return retry_delay_ms(tries_++, random);
 }
 

@@ -49,6 +49,7 @@ class Viewer {
   void note_lag(double ms);
   void follow(const Arrivals& arrivals);
   void enter(const SceneModel& scene, std::string name);
+  void go_to_start();
   Result<void> draw(std::uint32_t divisor);
   Result<void> draw_if_due();
   void note_drawn(double begin, double end, std::uint32_t divisor);
@@ -154,8 +155,8 @@ void Viewer::move(double since, bool rested) {
 void Viewer::take_answer() {
   const Answer answer = stream_->take_answer();
   if (answer.error) measured_.error = answer.error;
-  measured_.resolution_error = answer.resolution_error;
-  measured_.omitted_error = answer.omitted_error;
+  measured_.resolution_error = answer.resolution_error.value_or(measured_.resolution_error);
+  measured_.omitted_error = answer.omitted_error.value_or(measured_.omitted_error);
   if (answer.lag_ms) note_lag(*answer.lag_ms);
 }
 
@@ -179,15 +180,21 @@ void Viewer::follow(const Arrivals& a) {
   figures_.stream_frames += a.decode_ms.size();
 }
 
+void Viewer::go_to_start() {
+  rig_.stop();
+  rig_.view = start_;
+  camera_new_ = true;
+  pace_.moved(now_ms());
+}
+
 // A scene has come. One that was watched before keeps the hand where it was; in another one that is no place.
 void Viewer::enter(const SceneModel& scene, std::string name) {
   const bool same = scene_name_ == name;
   const bool other = scene_name_ && !same;
   scene_name_ = std::move(name);
   if (other) {
-    rig_.stop();
-    rig_.view = start_;
-    camera_new_ = true;
+    go_to_start();
+    stream_->say("Another scene is shown here now.", now_ms(), 5);
   }
   const auto mode = rig_.mode;
   const auto pivot = rig_.pivot;
@@ -305,6 +312,9 @@ void Viewer::obey(Action action) {
       break;
     case Action::kMode:
       controls_->toggle_mode();
+      break;
+    case Action::kStart:
+      go_to_start();
       break;
     case Action::kBare:
       show_.bare = !show_.bare;

@@ -16,6 +16,13 @@ test('a view comes back from its link, in a scene of 7 mm and one of 3 km', () =
   }
 });
 
+test('a link that other programs wrote on still leads to its view', () => {
+  const plain = fromHash('#view=-3.64,1.75,-0.26,-109,2,58');
+  assert.ok(plain !== null);
+  assert.deepEqual(fromHash('#view=-3.64%2C1.75%2c-0.26%2C-109%2C2%2C58'), plain);
+  assert.deepEqual(fromHash('#view=-3.64,1.75,-0.26,-109,2,58&utm_source=mail'), plain);
+});
+
 test('a link that was cut or made up is no view', () => {
   for (const hash of ['', '#', '#view=', '#view=1,2,3', '#view=1,2,3,4,5,60,7', '#view=1,2,NaN,0,0,60',
     '#view=1,2,Infinity,0,0,60', '#view=1e99,0,0,0,0,60', '#view=1,2,3,0,91,60', '#view=1,2,3,0,0,0',

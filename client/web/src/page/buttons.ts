@@ -6,6 +6,7 @@ import type {Mode} from './rig.js';
 export interface ButtonsOwner {
   toggleMode(): void;
   togglePanel(): void;
+  goToStart(): void;
   /** The link in the address bar is that of the view. */
   writeLink(): void;
 }
@@ -46,6 +47,7 @@ export class Buttons {
     else if (e.code === 'KeyP') this.owner.togglePanel();
     else if (e.code === 'KeyO') this.owner.toggleMode();
     else if (e.code === 'KeyH') this.bare();
+    else if (e.code === 'Home') this.owner.goToStart();
   }
 
   private bare(): void {

@@ -23,9 +23,13 @@ export function axisOf(value: number | undefined): number {
   return Math.sign(v) * Math.min(1, beyond);
 }
 
+function sheetIsOpen(): boolean {
+  return document.querySelector('dialog[open]') !== null;
+}
+
 // A sheet over the picture has all keys.
 function goesElsewhere(e: KeyboardEvent): boolean {
-  if (document.querySelector('dialog[open]') !== null) return true;
+  if (sheetIsOpen()) return true;
   return kScrollKeys.has(e.code) && e.target instanceof Element && e.target.closest('[data-scrolls]') !== null;
 }
 
@@ -60,6 +64,7 @@ export class Input {
     const wish: Vec3 = [0, 0, 0];
     let turn = 0;
     let tilt = 0;
+    if (sheetIsOpen()) this.held.clear();  // what was held does not go on behind it
     for (const code of this.held) {
       kKeys[code]?.forEach((v, i) => (wish[i]! += v));
       turn += (kTurnKeys[code] ?? 0) * kTurnSpeed * seconds;

@@ -18,9 +18,10 @@ export function toHash(view: View): string {
 
 /** Null: there is no view in it, or one that cannot be drawn. */
 export function fromHash(hash: string): View | null {
-  const match = /^#view=([^&]*)$/.exec(hash);
+  // Programs that pass links on write commas in another way, and add words of their own.
+  const match = /^#view=([^&]*)/.exec(hash);
   if (match === null) return null;
-  const parts = match[1]!.split(',');
+  const parts = match[1]!.replaceAll(/%2c/gi, ',').split(',');
   const values = parts.map((part) => (/^-?\d{1,12}(\.\d{1,16})?(e-?\d{1,2})?$/.test(part) ? Number(part) : NaN));
   if (values.length !== 6 || !values.every(Number.isFinite)) return null;
   const [x, y, z, yaw, pitch, fovy] = values as [number, number, number, number, number, number];

@@ -232,10 +232,9 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
     this.rig.setBounds(bounds);
     if (other && this.start !== null) {
       // Where the visitor stood is a place of the scene before.
-      this.rig.stop();
-      this.rig.view = fromPose(this.start);
+      this.goToStart();
       this.rig.setBounds(bounds);
-      this.cameraDirty = true;
+      this.notices.quiet('Another scene is shown here now.', 5);
     } else if (this.status.joins > 1) {
       Object.assign(this.rig, {mode, pivot});
     }
@@ -471,6 +470,14 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
     this.rig.mode = this.rig.mode === 'walk' ? 'orbit' : 'walk';
     if (this.rig.mode === 'orbit') this.pickPivot(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
     this.buttons.showMode(this.rig.mode);
+  }
+
+  /** Back to where the scene is entered. */
+  goToStart(): void {
+    if (this.start === null) return;
+    this.rig.stop();
+    this.rig.view = fromPose(this.start);
+    this.moved();
   }
 
   writeLink(): void {
