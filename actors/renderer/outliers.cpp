@@ -1,6 +1,8 @@
 #include "actors/renderer/outliers.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <vector>
 
 namespace darm::renderer {
@@ -45,6 +47,37 @@ Around look_around(const FilterWindow& w) {
   return around;
 }
 
+// What was taken from texels of one patch.
+struct Taken {
+  std::uint32_t patch = 0;
+  float texels = 0;  // that have samples: among these it is shared out
+  std::array<float, 3> irradiance{};
+  float grey = 0;
+};
+
+Taken& of_patch(std::vector<Taken>& all, std::uint32_t patch) {
+  for (auto& taken : all)
+    if (taken.patch == patch) return taken;
+  all.push_back({.patch = patch});
+  return all.back();
+}
+
+// Evenly over the patch's texels in the window: rooms that are lit by a small bright spot have most of their light in
+// rare samples, and would stay a fifth too dark for as long as these are held down.
+void share_out(FilterWindow& w, std::vector<Taken>& all) {
+  for (std::size_t at = 0; at < w.grey.size(); ++at)
+    for (auto& taken : all)
+      if (w.count[at] > 0 && w.patch[at] == taken.patch) ++taken.texels;
+  for (std::size_t at = 0; at < w.grey.size(); ++at) {
+    if (w.count[at] <= 0) continue;
+    for (const auto& taken : all) {
+      if (w.patch[at] != taken.patch) continue;
+      for (std::size_t c = 0; c < 3; ++c) w.irradiance[c][at] += taken.irradiance[c] / taken.texels;
+      w.grey[at] += taken.grey / taken.texels;
+    }
+  }
+}
+
 }  // namespace
 
 float outlier_bound(float count) { return 2.0f + 24.0f / count + count / 64.0f; }
@@ -53,6 +86,7 @@ void tame_outliers(FilterWindow& w) {
   const Around around = look_around(w);  // judged by what was measured, not by what was tamed
   double taken = 0;
   int texels = 0;
+  std::vector<Taken> by_patch;
   for (std::size_t at = 0; at < w.grey.size(); ++at) {
     texels += w.count[at] > 0 ? 1 : 0;
     if (w.count[at] <= 0 || w.count[at] >= kOutlierSamples || around.samples[at] < kFewNeighbours) continue;
@@ -60,10 +94,16 @@ void tame_outliers(FilterWindow& w) {
     if (w.grey[at] <= bound) continue;
     const float scale = bound / w.grey[at];  // grey > bound >= 0
     taken += double{w.grey[at]} - double{bound};
-    for (auto& channel : w.irradiance) channel[at] *= scale;
+    auto& own = of_patch(by_patch, w.patch[at]);
+    own.grey += w.grey[at] - bound;
+    for (std::size_t c = 0; c < 3; ++c) {
+      own.irradiance[c] += w.irradiance[c][at] * (1 - scale);
+      w.irradiance[c][at] *= scale;
+    }
     w.grey[at] *= scale;
     w.grey_m2[at] *= scale * scale;
   }
+  share_out(w, by_patch);
   w.held_down = static_cast<float>(taken / std::max(texels, 1));
 }
 

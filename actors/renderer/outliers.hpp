@@ -11,10 +11,11 @@ inline constexpr float kOutlierSamples = 1024;
 /// How many times the mean of its neighbours (5x5, same patch, itself left out) a texel of `count` samples may shine:
 /// 2 + 24 / count + count / 64. One sample may be many times the mean and still be what light is like there (a window
 /// that one direction in twenty meets): held to twice its neighbours it costs Sponza's atrium 4 dB. In the limit
-/// nothing is held down; what is held down meanwhile darkens the picture, never the store.
+/// nothing is held down; what is held down meanwhile is shared out in the picture, and the store knows nothing of it.
 [[nodiscard]] float outlier_bound(float count);
 
-/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was.
+/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was. What
+/// was taken goes to all texels of the patch in the window alike: the mean stays.
 void tame_outliers(FilterWindow& window);
 
 }  // namespace darm::renderer
