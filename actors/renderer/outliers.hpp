@@ -14,8 +14,8 @@ inline constexpr float kOutlierSamples = 1024;
 /// nothing is held down; what is held down meanwhile is shared out in the picture, and the store knows nothing of it.
 [[nodiscard]] float outlier_bound(float count);
 
-/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was. What
-/// was taken goes to all texels of the patch in the window alike: the mean stays.
+/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was.
+/// What was taken goes to all texels of the patch in the window alike: the mean stays.
 void tame_outliers(FilterWindow& window);
 
 }  // namespace darm::renderer

@@ -12,7 +12,18 @@
 
 namespace darm::client::desktop {
 
-enum class Action : std::uint8_t { kPanel, kMode, kBare, kStart, kLink, kScreenshot, kHelp, kCloseHelp, kFullScreen, kQuit };
+enum class Action : std::uint8_t {
+  kPanel,
+  kMode,
+  kBare,
+  kStart,
+  kLink,
+  kScreenshot,
+  kHelp,
+  kCloseHelp,
+  kFullScreen,
+  kQuit
+};
 
 /// Lives as long as the window, on its thread. Made before the overlay, which passes events on.
 class Controls {

@@ -194,8 +194,8 @@ void Overlay::lay_out(const OverlayShow& show, std::vector<Action>& clicked) {
 
 std::vector<Action> Overlay::draw(const OverlayShow& show) {
   std::vector<Action> clicked;
-  // A box takes its size from what was in it the time before, and is hidden the first time: what is new would be cut, or
-  // not seen at all, until something else is drawn.
+  // A box takes its size from what was in it the time before, and is hidden the first time: what is new would be cut,
+  // or not seen at all, until something else is drawn.
   lay_out(show, clicked);
   ImGui::EndFrame();
   lay_out(show, clicked);

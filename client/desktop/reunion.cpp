@@ -47,9 +47,8 @@ std::optional<double> Reunion::lost(const Error& reason, bool has_picture, doubl
     case Cause::kOther:
       break;
   }
-  words_.quiet =
-      has_picture ? "Connection lost; the picture stays. Trying again..."
-                  : sentence(reason.message) + " Trying again...";
+  words_.quiet = has_picture ? "Connection lost; the picture stays. Trying again..."
+                             : sentence(reason.message) + " Trying again...";
   return retry_delay_ms(tries_++, random);
 }
 
