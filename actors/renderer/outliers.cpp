@@ -56,26 +56,26 @@ struct Taken {
 };
 
 Taken& of_patch(std::vector<Taken>& all, std::uint32_t patch) {
-  for (auto& taken : all)
-    if (taken.patch == patch) return taken;
-  all.push_back({.patch = patch});
-  return all.back();
+  const auto found = std::ranges::find(all, patch, &Taken::patch);
+  return found != all.end() ? *found : all.emplace_back(Taken{.patch = patch});
 }
 
 // Evenly over the patch's texels in the window: rooms that are lit by a small bright spot have most of their light in
 // rare samples, and would stay a fifth too dark for as long as these are held down.
 void share_out(FilterWindow& w, std::vector<Taken>& all) {
-  for (std::size_t at = 0; at < w.grey.size(); ++at)
-    for (auto& taken : all)
-      if (w.count[at] > 0 && w.patch[at] == taken.patch) ++taken.texels;
-  for (std::size_t at = 0; at < w.grey.size(); ++at) {
-    if (w.count[at] <= 0) continue;
-    for (const auto& taken : all) {
-      if (w.patch[at] != taken.patch) continue;
-      for (std::size_t c = 0; c < 3; ++c) w.irradiance[c][at] += taken.irradiance[c] / taken.texels;
-      w.grey[at] += taken.grey / taken.texels;
+  if (all.empty()) return;  // nearly always
+  const auto each = [&](const auto& visit) {
+    for (std::size_t at = 0; at < w.grey.size(); ++at) {
+      if (w.count[at] <= 0) continue;
+      const auto taken = std::ranges::find(all, w.patch[at], &Taken::patch);
+      if (taken != all.end()) visit(*taken, at);
     }
-  }
+  };
+  each([](Taken& taken, std::size_t) { ++taken.texels; });
+  each([&](const Taken& taken, std::size_t at) {
+    for (std::size_t c = 0; c < 3; ++c) w.irradiance[c][at] += taken.irradiance[c] / taken.texels;
+    w.grey[at] += taken.grey / taken.texels;
+  });
 }
 
 }  // namespace

@@ -7,6 +7,7 @@ namespace darm::tile_scheduler {
 std::uint32_t VisibleSet::add(const Chain& chain, float count) {
   if (last_chain_ < counts_.size() && chains_.keys()[last_chain_] == chain) {
     counts_[last_chain_] += count;
+    surface_samples_ += double{count};
     return last_chain_;
   }
   if (chains_.size() >= kMaxChains && chains_.find(chain) == ChainIndex::kAbsent) {
@@ -16,6 +17,7 @@ std::uint32_t VisibleSet::add(const Chain& chain, float count) {
   const auto number = chains_.insert(chain);
   if (number == counts_.size()) counts_.push_back(0.0f);
   counts_[number] += count;
+  surface_samples_ += double{count};
   return last_chain_ = number;
 }
 
@@ -78,25 +80,16 @@ void VisibleSet::forget_early() {
 
 void VisibleSet::clear() { *this = VisibleSet{}; }
 
-double VisibleSet::surface_samples() const {
-  double out = 0;
-  for (const float count : counts_) out += double{count};
-  return out;
-}
-
 float VisibleSet::resolution_error() const {
-  const double samples = surface_samples();
-  return samples > 0 ? static_cast<float>(std::sqrt(magnified_ / samples)) : 0.0f;
+  return surface_samples_ > 0 ? static_cast<float>(std::sqrt(magnified_ / surface_samples_)) : 0.0f;
 }
 
 float VisibleSet::omitted_error() const {
-  const double samples = surface_samples();
-  return samples > 0 ? static_cast<float>(std::sqrt(omitted_ / samples)) : 0.0f;
+  return surface_samples_ > 0 ? static_cast<float>(std::sqrt(omitted_ / surface_samples_)) : 0.0f;
 }
 
 float VisibleSet::mean_diffuse() const {
-  const double samples = surface_samples();
-  return samples > 0 ? static_cast<float>(diffuse_ / samples) : 0.0f;
+  return surface_samples_ > 0 ? static_cast<float>(diffuse_ / surface_samples_) : 0.0f;
 }
 
 const TileUse* VisibleSet::find(TileId tile) const {

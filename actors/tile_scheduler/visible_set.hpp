@@ -74,7 +74,7 @@ class VisibleSet {
   [[nodiscard]] float omitted_error() const;
   [[nodiscard]] float mean_diffuse() const;
   /// Samples on surfaces: a layer of glass and what is behind it count both.
-  [[nodiscard]] double surface_samples() const;
+  [[nodiscard]] double surface_samples() const { return surface_samples_; }
 
  private:
   static constexpr std::array<TileId, kMaxLevels> no_tiles() {
@@ -89,6 +89,7 @@ class VisibleSet {
   TileIndex tiles_;
   std::vector<TileUse> uses_;
   double samples_ = 0;
+  double surface_samples_ = 0;
   double magnified_ = 0;
   double omitted_ = 0;
   double diffuse_ = 0;

@@ -66,41 +66,41 @@ test('a server without HTTPS offers none, but says how to get in', async () => {
   await daemon.stop();
 });
 
-test('without WebGL 2 the way out is named', async () => {
+/** What a page says that runs `script` first and then cannot show the scene. */
+async function alertWith(script) {
   const daemon = await serve(state.path, {more: ['--q', '16']});
   const context = await browser.newContext(small);
   const page = await context.newPage();
-  await page.addInitScript(() => {
+  await page.addInitScript(script);
+  await page.goto(`http://127.0.0.1:${daemon.web}/`);
+  const alert = page.getByRole('alert');
+  await alert.waitFor();
+  const text = await alert.innerText();
+  await nothingToPress(page);
+  await context.close();
+  await daemon.stop();
+  return text;
+}
+
+test('without WebGL 2 the way out is named', async () => {
+  const text = await alertWith(() => {
     const real = HTMLCanvasElement.prototype.getContext;
     HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
       return kind === 'webgl2' ? null : real.call(this, kind, ...more);
     };
   });
-  await page.goto(`http://127.0.0.1:${daemon.web}/`);
-  assert.match(await page.getByRole('alert').innerText(), /no WebGL 2.*turn on hardware acceleration/);
-  await nothingToPress(page);
-  await context.close();
-  await daemon.stop();
+  assert.match(text, /no WebGL 2.*turn on hardware acceleration/);
 });
 
 test('a scene that cannot be drawn is said, and leaves no buttons that do nothing', async () => {
-  const daemon = await serve(state.path, {more: ['--q', '16']});
-  const context = await browser.newContext(small);
-  const page = await context.newPage();
-  await page.addInitScript(() => {
+  const text = await alertWith(() => {
     // A driver that takes no shader.
     const real = WebGL2RenderingContext.prototype.shaderSource;
     WebGL2RenderingContext.prototype.shaderSource = function (shader) {
       real.call(this, shader, 'no shader');
     };
   });
-  await page.goto(`http://127.0.0.1:${daemon.web}/`);
-  const alert = page.getByRole('alert');
-  await alert.waitFor();
-  assert.match(await alert.innerText(), /cannot be drawn here.*another browser/);
-  await nothingToPress(page);
-  await context.close();
-  await daemon.stop();
+  assert.match(text, /cannot be drawn here.*another browser/);
 });
 
 test('a full server says so, and lets in who waits', async () => {

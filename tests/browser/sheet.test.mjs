@@ -30,6 +30,28 @@ async function viewAfter(page, key) {
   return (await status(page)).view;
 }
 
+test('a key that is held does not go on behind the sheet, and Home leads back to the start', async () => {
+  const {page, faults} = await inside({viewport: {width: 480, height: 270}, reducedMotion: 'reduce'});
+  const start = (await status(page)).view;
+  await page.locator('#scene').focus();
+  await page.keyboard.down('KeyS');
+  await page.waitForTimeout(500);
+  await page.keyboard.press('?');
+  await sheet(page).waitFor();
+  await page.waitForTimeout(500);
+  const behind = (await status(page)).view;
+  assert.notDeepEqual(behind.position, start.position, 'it walked');
+  await page.waitForTimeout(1000);
+  assert.deepEqual((await status(page)).view, behind, 'and stands behind the sheet');
+  await page.keyboard.up('KeyS');
+  await page.keyboard.press('Escape');
+  await page.keyboard.press('Home');
+  await page.waitForTimeout(500);
+  assert.deepEqual((await status(page)).view, start);
+  assert.deepEqual(faults, []);
+  await page.close();
+});
+
 test('the help is a button and the key ?, keeps the focus and the keys to itself, and gives both back', async () => {
   const {page, faults} = await inside({viewport: {width: 480, height: 270}, reducedMotion: 'reduce'});
   const help = sheet(page);

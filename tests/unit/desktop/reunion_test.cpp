@@ -35,7 +35,9 @@ TEST(Reunion, ALossIsSaidQuietlyAndThePictureStays) {
 TEST(Reunion, WithoutAPictureTheReasonIsSaid) {
   Reunion r;
   ASSERT_TRUE(r.lost(Error("host:9: no answer"), false, 0.5));
-  EXPECT_NE(r.words(0).quiet.find("host:9: no answer"), std::string::npos);
+  EXPECT_EQ(r.words(0).quiet, "host:9: no answer. Trying again...");
+  ASSERT_TRUE(r.lost(Error("is a server there?"), false, 0.5));
+  EXPECT_EQ(r.words(0).quiet, "is a server there? Trying again...") << "one mark at the end of a sentence";
 }
 
 TEST(Reunion, AFullServerIsTriedAgainLater) {

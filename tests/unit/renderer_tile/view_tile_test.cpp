@@ -13,6 +13,17 @@ namespace {
 
 const TileId kTile(0, 7);
 
+ViewDependentLight light_of(float radiance, float ggx_alpha) {
+  ViewDependentLight l;
+  l.radiance = glm::vec3(radiance);
+  l.ggx_alpha = ggx_alpha;
+  l.distance = 1;
+  return l;
+}
+
+// Every other sample of a texel, and of its neighbours the ones in between.
+bool flickers(int at, std::uint32_t sample) { return (sample * 7 + static_cast<std::uint32_t>(at)) % 2 == 0; }
+
 class ViewTileTest : public ::testing::Test {
  protected:
   // Brightness follows the eye's x; lobes of `alpha`.
@@ -112,11 +123,7 @@ TEST_F(ViewTileTest, samples_that_are_no_light_become_black_and_empty_texels_do_
 
 TEST_F(ViewTileTest, noise_is_told_and_ends_the_work) {
   world.light = [](TileId, int at, const glm::vec3&, std::uint32_t n) {
-    ViewDependentLight l;
-    l.radiance = glm::vec3(0.3f + ((n * 7 + static_cast<std::uint32_t>(at)) % 2 == 0 ? 0.2f : -0.2f));
-    l.ggx_alpha = 0.001f;
-    l.distance = 1;
-    return l;
+    return light_of(flickers(at, n) ? 0.5f : 0.1f, 0.001f);
   };
   tile.want(whole_slot());
   tile.see_from({1, 0, 0}, options);
@@ -133,10 +140,7 @@ TEST_F(ViewTileTest, noise_is_told_and_ends_the_work) {
 TEST_F(ViewTileTest, noise_counts_as_it_shows_on_top_of_the_shared_light) {
   float beneath = 0;
   world.light = [&](TileId, int at, const glm::vec3&, std::uint32_t n) {
-    ViewDependentLight l;
-    l.radiance = glm::vec3((n * 7 + static_cast<std::uint32_t>(at)) % 2 == 0 ? 0.04f : 0.0f);
-    l.ggx_alpha = 0.001f;
-    l.distance = 1;
+    auto l = light_of(flickers(at, n) ? 0.04f : 0.0f, 0.001f);
     l.beneath = beneath;
     return l;
   };
@@ -158,11 +162,7 @@ TEST_F(ViewTileTest, noise_counts_as_it_shows_on_top_of_the_shared_light) {
 TEST_F(ViewTileTest, what_its_filter_smears_counts) {
   // Stripes without noise that a wide lobe's filter blurs while samples are few.
   world.light = [](TileId, int at, const glm::vec3&, std::uint32_t) {
-    ViewDependentLight l;
-    l.radiance = glm::vec3(at / 4 % 2 == 0 ? 0.5f : 0.1f);
-    l.ggx_alpha = 0.5f;
-    l.distance = 1;
-    return l;
+    return light_of(at / 4 % 2 == 0 ? 0.5f : 0.1f, 0.5f);
   };
   tile.want(whole_slot());
   tile.see_from({1, 0, 0}, options);
