@@ -45,7 +45,7 @@ Result<void> make_state_dir(const std::filesystem::path& dir) {
 
 /// What the stored light depends on beside scene and layout: the sample sequences, what a sample means, and where paths
 /// ended: light that was taken from other light must not stand for traced light.
-constexpr std::uint64_t kLightVersion = 3;
+constexpr std::uint64_t kLightVersion = 4;
 std::uint64_t light_key(const config::Config& config) {
   return kLightVersion * 2 + (config.accuracy.indirect == "traced" ? 1 : 0);
 }
