@@ -40,7 +40,7 @@ class Shape:
         self.positions, self.normals, self.uvs, self.triangles = [], [], [], []
 
     def vertex(self, p, n, uv):
-        self.positions.append(p)
+        self.positions.append(tuple(round(c, 6) + 0.0 for c in p))  # equal where surfaces meet, however computed
         self.normals.append(n)
         self.uvs.append(uv)
         return len(self.positions) - 1
@@ -79,6 +79,25 @@ class Shape:
         return self.grid(lambda u, v: tuple(origin[k] + du[k] * u + dv[k] * v for k in range(3)), nu, nv,
                          lambda u, v: (u * lu, (1 - v) * lv), lambda u, v: n)
 
+    def band(self, one, other, normal):
+        """Between two polylines that run the same way: every vertex of either is one of its triangles', so that what
+        shares the line elsewhere leaves no cracks."""
+        flat = [k for k in range(3) if abs(normal[k]) < 0.5]
+        at = lambda p: self.vertex(p, normal, (p[flat[0]], -p[flat[1]]) if normal[0] == 0 else (p[2], -p[1]))
+        lines = [[at(p) for p in line] for line in (one, other)]
+        along = unit(sub(other[-1], other[0]))
+        far = lambda line, i: sum(a * b for a, b in zip(along, sub(line[i], line[0])))
+        i = [0, 0]
+        while i[0] + 1 < len(one) or i[1] + 1 < len(other):
+            ends = [i[k] + 1 == len(line) for k, line in enumerate((one, other))]
+            side = 1 if ends[0] else 0 if ends[1] else int(far(other, i[1] + 1) < far(one, i[0] + 1))
+            a, b, c = lines[0][i[0]], lines[1][i[1]], lines[side][i[side] + 1]
+            p = [self.positions[k] for k in (a, b, c)]
+            turned = sum(x * y for x, y in zip(cross(sub(p[1], p[0]), sub(p[2], p[0])), normal)) < 0
+            self.triangle(*((a, c, b) if turned else (a, b, c)))
+            i[side] += 1
+        return self
+
     def box(self, low, high, metres=1.0):
         (x0, y0, z0), (x1, y1, z1) = low, high
         dx, dy, dz = (x1 - x0, 0, 0), (0, y1 - y0, 0), (0, 0, z1 - z0)
@@ -107,17 +126,27 @@ class Shape:
                          lambda u, v: (u, 1 - v), normal)
 
 
+VAULT_STEPS = 36
+# Heights at which the window wall ends in vertices: what meets it there has them too.
+WINDOW_ROWS = (0, 0.9, 1.6, 2.3, 3.0, 4.2, 5)
+
+
 def hall_walls():
     s = Shape()
-    s.quad((-6, 0, 3), (0, 0, -6), (0, 5, 0), 6, 5)          # x = -6
-    s.quad((6, 0, -3), (0, 0, 6), (0, 5, 0), 6, 5)           # x = +6
+    for sign in (1, -1):                                     # x = -6 and x = +6
+        x, up = -6 * sign, (0, 5, 0)
+        start, along = (x, 0, 3), (0, 0, -5)                 # the last metre meets the window wall
+        if sign < 0:
+            start, along = (x, 0, -2), (0, 0, 5)
+        s.quad(start, along, up, 5, 5)
+        s.band([(x, y, -2) for y in range(6)], [(x, y, -3) for y in WINDOW_ROWS], (sign, 0, 0))
     s.quad((6, 0, 3), (-12, 0, 0), (0, 5, 0), 12, 5)         # z = +3
     for x, sign in ((-6, 1), (6, -1)):                       # the half discs under the vault
         n = (sign, 0, 0)
         def lunette(u, v, x=x, sign=sign):
             a = u * math.pi
             return (x, 5 + 3 * v * math.sin(a), 3 * v * math.cos(a) * sign)
-        s.grid(lunette, 32, 4, lambda u, v: (3 * v * math.cos(u * math.pi), -3 * v * math.sin(u * math.pi)),
+        s.grid(lunette, VAULT_STEPS, 3, lambda u, v: (3 * v * math.cos(u * math.pi), -3 * v * math.sin(u * math.pi)),
                lambda u, v, n=n: n)
     return s
 
@@ -127,41 +156,45 @@ def window_wall():
     s = Shape()
     inner, outer, half, sill, spring, top = -3.0, -3.4, 0.95, 0.9, 3.0, 4.2
     centres = (-3.0, 0.0, 3.0)
-    edges = [-6.0]
-    for c in centres:
-        edges += [c - half, c + half]
-    edges.append(6.0)
+    rows = [y for y in WINDOW_ROWS if sill <= y <= spring] + [top]
 
-    def both_faces(x0, x1, y0, y1, nu, nv):
-        s.quad((x0, y0, inner), (x1 - x0, 0, 0), (0, y1 - y0, 0), nu, nv)
-        s.quad((x1, y0, outer), (x0 - x1, 0, 0), (0, y1 - y0, 0))
+    def arch(c):
+        """Of the opening, from its left springing to its right one."""
+        steps = [math.pi * (1 - i / 20) for i in range(21)]
+        return [(c - half, spring)] + [(c + half * math.cos(a), spring + half * math.sin(a)) for a in steps[1:-1]] + \
+               [(c + half, spring)]
 
-    both_faces(-6, 6, 0, sill, 12, 1)
-    both_faces(-6, 6, top, 5, 12, 1)
-    for i in range(0, len(edges), 2):
-        both_faces(edges[i], edges[i + 1], sill, top, 2, 4)
+    def pier(x0, x1):
+        return [x0, (x0 + x1) / 2, x1]
+
+    edges = [-6.0] + [e for c in centres for e in (c - half, c + half)] + [6.0]
+    piers = [pier(*edges[i:i + 2]) for i in range(0, len(edges), 2)]
+    below = sorted({x for p in piers for x in p} | set(centres))                     # along the sills
+    above = sorted({x for p in piers for x in p} | {x for c in centres for x, _ in arch(c)})
+    metres = range(-6, 7)
+
+    for z, n in ((inner, (0, 0, 1)), (outer, (0, 0, -1))):
+        s.band([(x, 0, z) for x in metres], [(x, sill, z) for x in below], n)
+        for xs in piers:
+            for x0, x1 in zip(xs, xs[1:]):
+                s.band([(x0, y, z) for y in rows], [(x1, y, z) for y in rows], n)
+        for c in centres:
+            s.band([(x, y, z) for x, y in arch(c)], [(x, top, z) for x, _ in arch(c)], n)
+        s.band([(x, top, z) for x in above], [(x, 5, z) for x in metres], n)
     for c in centres:
-        depth = (0, 0, inner - outer)
         s.quad((c - half, sill, inner), (2 * half, 0, 0), (0, 0, outer - inner), 2, 1)                # the sill
-        s.quad((c - half, sill, inner), (0, 0, outer - inner), (0, spring - sill, 0), 1, 3)           # its sides
-        s.quad((c + half, sill, outer), depth, (0, spring - sill, 0), 1, 3)
+        for x, n in ((c - half, (1, 0, 0)), (c + half, (-1, 0, 0))):                                  # its sides
+            s.band([(x, y, inner) for y in rows[:-1]], [(x, y, outer) for y in rows[:-1]], n)
+        outline = arch(c)
 
-        def arc(u, c=c):
+        def soffit(u, v, outline=outline):
+            x, y = outline[round(u * 20)]
+            return (x, y, outer + (inner - outer) * v)
+
+        def inwards(u, v, c=c):
             a = math.pi * (1 - u)
-            return (c + half * math.cos(a), spring + half * math.sin(a))
-
-        def soffit(u, v):
-            x, y = arc(u)
-            return (x, y, inner + (outer - inner) * v)
-        s.grid(lambda u, v: soffit(u, 1 - v), 20, 1)
-
-        for z, front in ((inner, True), (outer, False)):
-            def spandrel(u, v, z=z, front=front, c=c):
-                w = u if front else 1 - u
-                x, y = arc(w)
-                return (x, y + (top - y) * v, z)
-            s.grid(spandrel, 20, 1, lambda u, v, f=spandrel: (f(u, v)[0], -f(u, v)[1]),
-                   lambda u, v, front=front: (0, 0, 1 if front else -1))
+            return (-math.cos(a), -math.sin(a), 0)
+        s.grid(soffit, 20, 1, normal=inwards)
     return s
 
 
@@ -171,7 +204,7 @@ def vault():
         a = v * math.pi
         return (-6 + 12 * u, 5 + 3 * math.sin(a), -3 * math.cos(a))
     # Seen from below: the front looks inwards.
-    return s.grid(point, 12, 36, lambda u, v: (12 * u, 9.4 * v))
+    return s.grid(point, 12, VAULT_STEPS, lambda u, v: (12 * u, 9.4 * v))
 
 
 def rib():
