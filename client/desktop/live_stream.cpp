@@ -84,6 +84,22 @@ bool LiveStream::connected() const {
   return connected_;
 }
 
+void LiveStream::leave() {
+  const std::lock_guard lock(mutex_);
+  wishes_.away = true;
+}
+
+void LiveStream::come_back() {
+  const std::lock_guard lock(mutex_);
+  wishes_.away = false;
+  retry_.notify_all();
+}
+
+void LiveStream::pictured() {
+  const std::lock_guard lock(mutex_);
+  reunion_.pictured();
+}
+
 void LiveStream::say(std::string text, double now, double seconds) {
   const std::lock_guard lock(mutex_);
   reunion_.say(std::move(text), now, seconds);
@@ -111,9 +127,13 @@ void LiveStream::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const Error reason = visit(stop);
     if (stop.stop_requested()) return;
+    if (std::exchange(let_go_, false)) {
+      wait_for_somebody(stop);
+      continue;
+    }
     std::unique_lock lock(mutex_);
     connected_ = false;
-    const auto wait = reunion_.lost(reason, has_picture_, chance(random_));
+    const auto wait = reunion_.lost(reason, chance(random_));
     lock.unlock();
     wake_();
     lock.lock();
@@ -124,6 +144,18 @@ void LiveStream::run(const std::stop_token& stop) {
       retry_.wait(lock, stop, never);
     }
   }
+}
+
+bool LiveStream::may_let_go() const {
+  const std::lock_guard lock(mutex_);
+  return wishes_.away && scene_ && scene_->all_read();
+}
+
+void LiveStream::wait_for_somebody(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  connected_ = false;
+  reunion_.left();
+  retry_.wait(lock, stop, [this] { return !wishes_.away; });
 }
 
 // One session from Hello to its end, which is told.
@@ -142,6 +174,8 @@ Error LiveStream::visit(const std::stop_token& stop) {
   Connection& connection = **opened;
   if (auto ok = join(connection.welcome()); !ok) return contradiction(ok.error());
   while (!stop.stop_requested()) {
+    let_go_ = may_let_go();
+    if (let_go_) return Error("nobody looks");
     if (auto ok = send_due(connection); !ok) return ok.error();
     auto message = connection.next(kLook);
     while (message && *message && !stop.stop_requested()) {  // what has come together, but no camera waits for it
@@ -234,7 +268,6 @@ Result<void> LiveStream::handle_frame(const Received& message) {
     return {};
   }
   decode_us_ = now_us() - before;
-  has_picture_ = has_picture_ || (player_->has_coarse() && scene_->all_read());
   auto news = player_->take_news();
   post([&](Arrivals& a) {
     a.shared.add(std::move(news));

@@ -69,6 +69,12 @@ class LiveStream {
   [[nodiscard]] unsigned joins() const;
   /// There is a session now.
   [[nodiscard]] bool connected() const;
+  /// Nobody looks any more: the session is let go once all of the scene is here, since it would come all over again.
+  void leave();
+  /// Somebody looks again: a session is there soon, and without words.
+  void come_back();
+  /// The scene is on the screen (Reunion::pictured).
+  void pictured();
   /// A passing line (Reunion::say), and what is to be read at `now`, milliseconds of now_us().
   void say(std::string text, double now, double seconds);
   [[nodiscard]] Notice words(double now) const;
@@ -81,9 +87,12 @@ class LiveStream {
     std::uint64_t shown_frame = 0;
     std::int64_t draw_us = 0;
     bool shown_new = false;
+    bool away = false;
   };
 
   void run(const std::stop_token& stop);
+  [[nodiscard]] bool may_let_go() const;
+  void wait_for_somebody(const std::stop_token& stop);
   [[nodiscard]] Error visit(const std::stop_token& stop);
   [[nodiscard]] Result<void> join(const wire::Welcome& welcome);
   [[nodiscard]] Result<void> make_players();
@@ -108,9 +117,9 @@ class LiveStream {
   // Of the stream's thread alone.
   std::optional<SceneModel> scene_;  // its geometry is read here and kept by whoever draws
   std::optional<StreamPlayer> player_, view_player_;
+  bool let_go_ = false;  // the last session, since nobody looked
   StreamShape shape_;
   std::optional<StreamShape> view_shape_;
-  bool has_picture_ = false;
   std::int64_t camera_every_us_ = 50'000, camera_sent_us_ = 0, keys_asked_us_ = 0, decode_us_ = 0;
   std::uint64_t sequence_ = 0, answered_ = 0;
   std::minstd_rand random_{std::random_device{}()};

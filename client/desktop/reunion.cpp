@@ -25,16 +25,27 @@ double retry_delay_ms(unsigned n, double random) {
 void Reunion::joined(double now) {
   tries_ = 0;
   words_ = {};
-  if (joins_++ > 0) say("Connected again.", now, 3);
+  if (!pictured_) words_.quiet = kWalkingIn;
+  if (joins_++ > 0 && !std::exchange(left_, false)) say("Connected again.", now, 3);
 }
 
-std::optional<double> Reunion::lost(const Error& reason, bool has_picture, double random) {
+void Reunion::left() {
+  words_ = {};
+  left_ = true;
+}
+
+void Reunion::pictured() {
+  pictured_ = true;
+  if (words_.quiet == kWalkingIn) words_.quiet.clear();
+}
+
+std::optional<double> Reunion::lost(const Error& reason, double random) {
   words_ = {};
   passing_until_ = 0;
   switch (reason.cause) {
     case Cause::kFull: {
       const std::string text = "The server has as many visitors as it may have. It is tried again in 10 s.";
-      (has_picture ? words_.quiet : words_.alert) = text;
+      (pictured_ ? words_.quiet : words_.alert) = text;
       return kFullRetryMs;
     }
     case Cause::kVersion:
@@ -47,8 +58,8 @@ std::optional<double> Reunion::lost(const Error& reason, bool has_picture, doubl
     case Cause::kOther:
       break;
   }
-  words_.quiet = has_picture ? "Connection lost; the picture stays. Trying again..."
-                             : sentence(reason.message) + " Trying again...";
+  words_.quiet =
+      pictured_ ? "Connection lost; the picture stays. Trying again..." : sentence(reason.message) + " Trying again...";
   return retry_delay_ms(tries_++, random);
 }
 

@@ -22,13 +22,14 @@ struct Notice {
 /// How one visit goes, from loss to loss. Times are milliseconds of any steady clock, given by the caller.
 class Reunion {
  public:
-  Reunion() { words_.quiet = "Walking in..."; }
-
   /// The session is agreed on.
   void joined(double now);
+  /// The session was given up because nobody looked: the next one comes without words.
+  void left();
+  /// Something is shown, and stays when the session ends.
+  void pictured();
   /// It ended, or did not come about, by `reason`. Gives the milliseconds until the next try; nothing: for good.
-  /// `has_picture`: something is shown that stays.
-  [[nodiscard]] std::optional<double> lost(const Error& reason, bool has_picture, double random);
+  [[nodiscard]] std::optional<double> lost(const Error& reason, double random);
   /// A line that leaves by itself after `seconds`.
   void say(std::string text, double now, double seconds);
   /// What is to be read at `now`.
@@ -38,10 +39,13 @@ class Reunion {
   [[nodiscard]] unsigned joins() const { return joins_; }
 
  private:
-  Notice words_;
+  static constexpr const char* kWalkingIn = "Walking in...";
+
+  Notice words_{kWalkingIn, ""};
   std::string passing_;
   double passing_until_ = 0;
   unsigned joins_ = 0, tries_ = 0;
+  bool pictured_ = false, left_ = false;
 };
 
 }  // namespace darm::client::desktop

@@ -28,6 +28,7 @@ namespace {
 
 constexpr double kPanelEveryMs = 500;
 constexpr double kLongestWaitMs = 250;
+constexpr double kLeaveAfterMs = 10'000;       // long enough that looking something up costs nobody a new session
 constexpr double kRefineAfterMs = 50;          // how often it is asked whether a view drawn coarsely has come to rest
 constexpr std::uint32_t kCountCoarseness = 8;  // residency is counted on one sample for so many pixels on a side
 
@@ -43,6 +44,7 @@ class Viewer {
   Result<void> run();
 
  private:
+  void watch_presence();
   void move(double since, bool rested);
   Result<void> take_arrivals();
   void take_answer();
@@ -78,7 +80,7 @@ class Viewer {
   std::future<std::string> saving_;  // what there is to say of a picture once it is written
 
   const double start_ms_ = now_ms();
-  double last_step_ms_ = start_ms_, panel_ms_ = 0, whole_ms_ = 0;
+  double last_step_ms_ = start_ms_, panel_ms_ = 0, whole_ms_ = 0, hidden_ms_ = 0;
   bool placed_ = false;  // by the plan or by hand: the server's start does not move it
   bool camera_new_ = true, drew_ = false;
   UprightView start_;                      // where the server's scene is entered
@@ -108,6 +110,7 @@ Result<void> Viewer::run() {
     const double pause = patience();
     window_->wait(pause);
     move(std::exchange(last_step_ms_, now_ms()), pause > 0);
+    watch_presence();
     if (auto ok = draw_if_due(); !ok) return ok;
     if (auto ok = present(); !ok) return ok;
   }
@@ -123,6 +126,18 @@ double Viewer::patience() const {
   if (drawn_divisor_ > 1) wait = std::min(wait, kRefineAfterMs);
   if (show_.panel && !show_.bare) wait = std::min(wait, panel_ms_ + kPanelEveryMs - now);
   return wait;
+}
+
+// Nobody looks at an iconified window: after a while it lets its session go.
+void Viewer::watch_presence() {
+  const double now = now_ms();
+  if (size_.width > 0) {
+    if (std::exchange(hidden_ms_, 0) > 0) stream_->come_back();
+  } else if (hidden_ms_ == 0) {
+    hidden_ms_ = now;
+  } else if (now - hidden_ms_ >= kLeaveAfterMs) {
+    stream_->leave();
+  }
 }
 
 void Viewer::move(double since, bool rested) {
@@ -253,6 +268,7 @@ void Viewer::note_drawn(double begin, double end, std::uint32_t divisor) {
     figures_.coarsest = std::max(figures_.coarsest, divisor);
   } else if (stage_.whole()) {
     whole_ms_ = end;
+    stream_->pictured();
     figures_.first_picture_seconds = (end - start_ms_) / 1000;
     figures_.first_picture_bytes = stream_->traffic().received;
     figures_.upload_ms = Series();  // those of geometry are no frame's

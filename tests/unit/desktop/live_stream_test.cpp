@@ -147,6 +147,8 @@ TEST(LiveStream, JoinsBringsTheSceneAndSendsTheNewestCamera) {
   EXPECT_GT(woken, 0);
   EXPECT_TRUE(comes([&] { return looked == 2; }));
   EXPECT_GT(stream.traffic().received, 0u);
+  EXPECT_EQ(stream.words(now()).quiet, "Walking in...");
+  stream.pictured();
   EXPECT_EQ(stream.words(now()).quiet, "");
 }
 
@@ -181,6 +183,33 @@ TEST(LiveStream, ComesBackAfterALossWithTheSceneItHasAndWhereTheVisitorIsNow) {
   Arrivals a = stream.take();
   EXPECT_TRUE(a.joined);
   EXPECT_FALSE(a.scene) << "it is here";
+}
+
+TEST(LiveStream, LetsItsSessionGoWhileNobodyLooksAndIsBackWithoutAWordOrTheSceneAgain) {
+  std::atomic<bool> left = false;
+  ScriptedServer server([&](unsigned visit, Peer& peer) {
+    const auto hello = peer.read().hello();
+    peer.send(welcome(visit > 0));
+    if (visit > 0) {
+      EXPECT_EQ(hello.known_scene(), kTag);
+    } else {
+      send_scene(peer);
+    }
+    peer.hold_until_gone();
+    left = true;
+  });
+  LiveStream stream(server.address(), [] {});
+  std::size_t chunks = 0;
+  ASSERT_TRUE(comes([&] { return (chunks += stream.take().chunks.size()) == 1; }));
+  stream.pictured();
+  stream.leave();
+  ASSERT_TRUE(comes([&] { return left.load() && !stream.connected(); }));
+  std::this_thread::sleep_for(700ms);  // longer than until the first try after a loss
+  EXPECT_EQ(server.visits, 1u) << "nobody asked for another";
+  EXPECT_EQ(stream.words(now()).quiet, "");
+  stream.come_back();
+  ASSERT_TRUE(comes([&] { return stream.joins() == 2; }));
+  EXPECT_EQ(stream.words(now()).quiet, "");
 }
 
 TEST(LiveStream, TriesAgainEverMoreSeldomWhileNobodyAnswers) {

@@ -15,34 +15,48 @@ TEST(Reunion, ALossIsSaidQuietlyAndThePictureStays) {
   Reunion r;
   EXPECT_FALSE(r.words(0).quiet.empty()) << "walking in";
   r.joined(1000);
-  EXPECT_EQ(r.words(1000).quiet, "") << "the first time goes without words";
-  const auto first = r.lost(Error("server: closed the connection"), true, 0.5);
+  EXPECT_EQ(r.words(1000).quiet, "Walking in...") << "until there is a picture";
+  r.pictured();
+  EXPECT_EQ(r.words(1100).quiet, "");
+  const auto first = r.lost(Error("server: closed the connection"), 0.5);
   ASSERT_TRUE(first);
   EXPECT_NE(r.words(2000).quiet.find("the picture stays"), std::string::npos);
   EXPECT_EQ(r.words(2000).alert, "");
-  const auto second = r.lost(Error("refused"), true, 0.5);
+  const auto second = r.lost(Error("refused"), 0.5);
   ASSERT_TRUE(second);
   EXPECT_GT(*second, *first);
   r.joined(5000);
   EXPECT_EQ(r.words(5001).quiet, "Connected again.");
   EXPECT_EQ(r.words(8001).quiet, "") << "it leaves by itself";
-  const auto anew = r.lost(Error("closed"), true, 0.5);
+  const auto anew = r.lost(Error("closed"), 0.5);
   ASSERT_TRUE(anew);
   EXPECT_EQ(*anew, *first) << "the next loss is a new one";
   EXPECT_EQ(r.joins(), 2u);
 }
 
+TEST(Reunion, WhoLeftBecauseNobodyLookedComesBackWithoutWords) {
+  Reunion r;
+  r.joined(0);
+  r.pictured();
+  r.left();
+  r.joined(1000);
+  EXPECT_EQ(r.words(1001).quiet, "");
+  ASSERT_TRUE(r.lost(Error("closed"), 0.5));
+  r.joined(2000);
+  EXPECT_EQ(r.words(2001).quiet, "Connected again.");
+}
+
 TEST(Reunion, WithoutAPictureTheReasonIsSaid) {
   Reunion r;
-  ASSERT_TRUE(r.lost(Error("host:9: no answer"), false, 0.5));
+  ASSERT_TRUE(r.lost(Error("host:9: no answer"), 0.5));
   EXPECT_EQ(r.words(0).quiet, "host:9: no answer. Trying again...");
-  ASSERT_TRUE(r.lost(Error("is a server there?"), false, 0.5));
+  ASSERT_TRUE(r.lost(Error("is a server there?"), 0.5));
   EXPECT_EQ(r.words(0).quiet, "is a server there? Trying again...") << "one mark at the end of a sentence";
 }
 
 TEST(Reunion, AFullServerIsTriedAgainLater) {
   Reunion r;
-  const auto wait = r.lost(Error("full", Cause::kFull), false, 0.5);
+  const auto wait = r.lost(Error("full", Cause::kFull), 0.5);
   ASSERT_TRUE(wait);
   EXPECT_GE(*wait, 10'000);
   EXPECT_FALSE(r.words(0).alert.empty());
@@ -53,7 +67,8 @@ TEST(Reunion, AFullServerIsTriedAgainLater) {
 TEST(Reunion, WhatTimeDoesNotHealIsNotTriedAgain) {
   for (const Cause cause : {Cause::kVersion, Cause::kRefused, Cause::kProtocol}) {
     Reunion r;
-    EXPECT_FALSE(r.lost(Error("why", cause), true, 0.5));
+    r.pictured();
+    EXPECT_FALSE(r.lost(Error("why", cause), 0.5));
     EXPECT_NE(r.words(0).alert.find("why"), std::string::npos);
   }
 }
@@ -61,7 +76,8 @@ TEST(Reunion, WhatTimeDoesNotHealIsNotTriedAgain) {
 TEST(Reunion, APassingLineGivesWayToWhatWasThereBefore) {
   Reunion r;
   r.joined(0);
-  static_cast<void>(r.lost(Error("closed"), true, 0.5));
+  r.pictured();
+  static_cast<void>(r.lost(Error("closed"), 0.5));
   const std::string lost = r.words(10).quiet;
   r.say("Saved.", 10, 2);
   EXPECT_EQ(r.words(2009).quiet, "Saved.");

@@ -1,6 +1,9 @@
 // What the page says in words: one quiet line, or one that nothing goes on without.
 import type {Sentence} from './requirements.js';
 
+/** Until there is a complete picture. */
+export const kWalkingIn = 'Walking in…';
+
 export class Notices {
   private hideTimer = 0;
   private standing = '';  // said until something else is so

@@ -3,7 +3,7 @@ import {kStreamPath} from '../shared/limits.js';
 import type {FromWorker, Pose, ToWorker} from '../shared/messages.js';
 import {fromHash} from './link.js';
 import {toPose} from './camera.js';
-import {Notices} from './notices.js';
+import {kWalkingIn, Notices} from './notices.js';
 import {whatIsMissing} from './requirements.js';
 import {askHttpsPort} from './secure_way.js';
 
@@ -44,7 +44,7 @@ async function start(): Promise<void> {
     if (missing !== null) notices.alert(missing);
     return;
   }
-  notices.quiet('Walking in…');
+  notices.quiet(kWalkingIn);
   const linked = fromHash(location.hash);
   const {width, height} = devicePixels();
   const pose: Pose | null = linked ? toPose(linked, width, height) : null;

@@ -11,6 +11,7 @@ import {Help} from './help.js';
 import type {InputOwner} from './input.js';
 import {Input} from './input.js';
 import {fromHash, toHash} from './link.js';
+import {kWalkingIn} from './notices.js';
 import type {Notices} from './notices.js';
 import {Panel} from './panel.js';
 import {pick} from './pick.js';
@@ -201,7 +202,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
   }
 
   private join(m: Extract<FromWorker, {type: 'joined'}>): void {
-    this.notices.quiet('');
+    this.notices.quiet(this.status.firstPictureMs === null ? kWalkingIn : '');
     if (this.status.joins > 0 && !this.away) this.notices.quiet('Connected again.', 3);
     this.notices.calm();
     this.away = false;
@@ -403,6 +404,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
     this.status.bytesToFirstPicture = this.traffic.received;
     this.status.firstPictureBytes = {geometry, coarse, stream: stream - coarse};
     performance.mark('darm first picture');
+    if (this.status.joined) this.notices.quiet('');
   }
 
   private noteDrawn(): void {
