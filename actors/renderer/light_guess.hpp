@@ -11,6 +11,11 @@ struct LightGuess {
   glm::vec3 soft{0.0f};
   float sharp_spread = 0;  ///< variance of the luminance of `sharp` among those texels, nits squared
   float soft_spread = 0;
+  float sharp_around = 0;  ///< the same among the sixteen around the place
+  float soft_around = 0;
+  float soft_noise = 0;     ///< variance of the luminance of `soft` for want of samples
+  bool surrounded = false;  ///< most of the sixteen are known
+  bool lone = false;        ///< all of the patch is one texel
 };
 
 /// One layer of a texel's light, nits.
@@ -20,10 +25,10 @@ struct LayerLight {
   float texels = 1;    ///< over so many around it that error is the same, >= 1
 };
 
-/// A guess with its error: one and a half times the spread of the texels it comes from (a step between them may lie
-/// anywhere), and a fifth of its value for what is finer than they are. Measured on 18,000 texels of Sponza's atrium at
-/// q = 64 against 48 samples: the square error over the guess's square is 0.03-0.04 where the spread is under a tenth,
-/// 0.15 at 0.3, 1.1 at 0.6 and above.
-[[nodiscard]] LayerLight from_guess(const glm::vec3& mean, float spread);
+/// A layer of a guess with its error: the spread of the texels it comes from and a fifth of its value for what is finer
+/// than they are, but no more than light varies around the place: where that is smooth, so is what is finer. A patch of
+/// one texel has the noise of that one. Measured by guess_bench (ARCHITECTURE.md, decision 26).
+[[nodiscard]] LayerLight sharp_of(const LightGuess& guess);
+[[nodiscard]] LayerLight soft_of(const LightGuess& guess);
 
 }  // namespace darm::renderer

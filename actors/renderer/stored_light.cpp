@@ -14,6 +14,31 @@ namespace {
 
 constexpr float kLeastTexels = 2.0f;
 
+// Weighted variance of both layers' luminances, of their differences to one of them: that of nearly equal ones is
+// exact.
+struct Spread {
+  float weight = 0;
+  glm::vec2 sum{0.0f}, squares{0.0f};
+
+  void add(const glm::vec2& v, float w) {
+    weight += w;
+    sum += w * v;
+    squares += w * v * v;
+  }
+  [[nodiscard]] glm::vec2 variance() const {
+    if (!(weight > 0)) return glm::vec2(0.0f);
+    return glm::max(squares / weight - sum * sum / (weight * weight), glm::vec2(0.0f));
+  }
+};
+
+// Of the nine that the weights of sixteen texels add up to.
+constexpr float kMostAround = 6.0f;
+
+// Of the four texels along an axis around a place `part` of the way from the second to the third: what a look-up there
+// reads, and what three look-ups do that are a texel apart.
+float near_weight(int i, float part) { return i == 1 ? 1 - part : i == 2 ? part : 0.0f; }
+float around_weight(int i, float part) { return i == 0 ? 1 - part : i == 3 ? part : 1.0f; }
+
 }  // namespace
 
 std::array<StoredTexel, kTileTexels> stored_texels(const atlas::TileView& tile,
@@ -28,7 +53,9 @@ std::array<StoredTexel, kTileTexels> stored_texels(const atlas::TileView& tile,
     if (!smooth && tile.count(Layer::kSoft, t) <= 0) continue;
     glm::vec3 soft = tile.mean(Layer::kSoft, t);
     if (smooth) soft = {filtered[slot].irradiance[0], filtered[slot].irradiance[1], filtered[slot].irradiance[2]};
-    texel = {tile.mean(Layer::kSharp, t), soft, true};
+    const float grey = luminance(soft);
+    const float noise = smooth ? filtered[slot].variance : tile.variance_of_mean(Layer::kSoft, t, grey * grey);
+    texel = {tile.mean(Layer::kSharp, t), soft, true, noise};
   }
   return out;
 }
@@ -47,8 +74,9 @@ void StoredLight::put(std::uint32_t tile_index, std::span<const StoredTexel> tex
   for (std::size_t t = 0; t < kTileTexels; ++t) {
     const auto& from = texels[t];
     const glm::vec3 sum = from.sharp + from.soft;
-    const float least = std::min({from.sharp.x, from.sharp.y, from.sharp.z, from.soft.x, from.soft.y, from.soft.z});
-    const bool sound = from.known && least >= 0 && std::isfinite(sum.x + sum.y + sum.z);
+    const float least =
+        std::min({from.sharp.x, from.sharp.y, from.sharp.z, from.soft.x, from.soft.y, from.soft.z, from.soft_variance});
+    const bool sound = from.known && least >= 0 && std::isfinite(sum.x + sum.y + sum.z + from.soft_variance);
     texels_[(y + t / kTileSize) * level.width + x + t % kTileSize] = sound ? from : StoredTexel{};
   }
 }
@@ -77,35 +105,42 @@ std::optional<LightGuess> StoredLight::guess(PatchId patch, int level, const glm
   const float ratio = place.scale > 0 ? coarse.scale * to.density / (place.scale * from.density) : 0.0f;
   const glm::vec2 corner =
       (at - 0.5f - glm::vec2(place.x, place.y)) * ratio + glm::vec2(coarse.x, coarse.y);  // texel centres at integers
+  LightGuess out;
+  out.lone = !(ratio > 0);
   const glm::vec2 floor = glm::floor(corner);
   const glm::vec2 part = corner - floor;
-  LightGuess out;
-  float weight = 0;
-  glm::vec2 pivot(0.0f);  // differences to one of the texels, so that the variance of nearly equal ones is exact
-  glm::vec2 square(0.0f);
-  glm::vec2 mean(0.0f);
-  for (int k = 0; k < 4; ++k) {
-    const float x = floor.x + static_cast<float>(k & 1);
-    const float y = floor.y + static_cast<float>(k >> 1);
-    const float w = ((k & 1) != 0 ? part.x : 1 - part.x) * ((k >> 1) != 0 ? part.y : 1 - part.y);
-    if (!(w > 0) || !(x >= 0 && y >= 0) || x >= static_cast<float>(to.width) || y >= static_cast<float>(to.height))
-      continue;
-    const StoredTexel& texel = texels_[static_cast<std::size_t>(y) * to.width + static_cast<std::size_t>(x)];
-    if (!texel.known) continue;
-    const glm::vec2 grey(luminance(texel.sharp), luminance(texel.soft));
-    if (weight == 0) pivot = grey;
-    weight += w;
-    out.sharp += w * texel.sharp;
-    out.soft += w * texel.soft;
-    mean += w * (grey - pivot);
-    square += w * (grey - pivot) * (grey - pivot);
+  Spread near, around;
+  glm::vec2 pivot(0.0f);
+  for (int j = 0; j < 4; ++j) {
+    const float y = floor.y + static_cast<float>(j - 1);
+    for (int i = 0; i < 4; ++i) {
+      const float x = floor.x + static_cast<float>(i - 1);
+      const float w = near_weight(i, part.x) * near_weight(j, part.y);
+      if (out.lone && !(w > 0)) continue;  // the others are other patches'
+      if (!(x >= 0 && y >= 0) || x >= static_cast<float>(to.width) || y >= static_cast<float>(to.height)) continue;
+      const StoredTexel& texel = texels_[static_cast<std::size_t>(y) * to.width + static_cast<std::size_t>(x)];
+      if (!texel.known) continue;
+      const glm::vec2 grey(luminance(texel.sharp), luminance(texel.soft));
+      if (around.weight == 0) pivot = grey;
+      around.add(grey - pivot, around_weight(i, part.x) * around_weight(j, part.y));
+      if (!(w > 0)) continue;
+      near.add(grey - pivot, w);
+      out.sharp += w * texel.sharp;
+      out.soft += w * texel.soft;
+      out.soft_noise += w * texel.soft_variance;
+    }
   }
-  if (!(weight > 1e-3f)) return std::nullopt;
-  out.sharp /= weight;
-  out.soft /= weight;
-  const glm::vec2 spread = glm::max(square / weight - mean * mean / (weight * weight), glm::vec2(0.0f));
+  if (!(near.weight > 1e-3f)) return std::nullopt;
+  out.sharp /= near.weight;
+  out.soft /= near.weight;
+  out.soft_noise /= near.weight;
+  const glm::vec2 spread = near.variance();
+  const glm::vec2 wide = around.variance();
   out.sharp_spread = spread.x;
   out.soft_spread = spread.y;
+  out.sharp_around = wide.x;
+  out.soft_around = wide.y;
+  out.surrounded = around.weight > kMostAround;
   return out;
 }
 

@@ -23,6 +23,7 @@ struct StoredTexel {
   glm::vec3 sharp{0.0f};
   glm::vec3 soft{0.0f};
   bool known = false;
+  float soft_variance = 0;  ///< of the luminance of `soft`: noise, nits squared
 };
 
 /// What a tile of the store holds, as StoredTexels; soft light as filtered in `filtered` (32x32, of a slot with its

@@ -36,6 +36,30 @@ double display_square(const std::array<float, 3>& linear, float squared) {
   return std::min(sum / 3, 0.25);
 }
 
+// What texels filled from others are off by: as much as those differ from one another. As if one more of them were
+// known that is a quarter of the display's range off, which stands for what all of them have missed.
+class FillError {
+ public:
+  void see(const std::array<float, 3>& linear) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double shown = srgb(linear[c]);
+      sum_[c] += shown;
+      squares_[c] += shown * shown;
+    }
+    ++known_;
+  }
+  [[nodiscard]] double square() const {
+    const double n = known_;
+    double apart = 0;  // n times the variance, mean of the channels
+    for (std::size_t c = 0; c < 3 && known_ > 0; ++c) apart += std::max(squares_[c] - sum_[c] * sum_[c] / n, 0.0) / 3;
+    return (apart + 0.25 * 0.25) / (n + 1);
+  }
+
+ private:
+  std::array<double, 3> sum_{}, squares_{};  // of values in 0..1, at most 900 of them
+  int known_ = 0;
+};
+
 constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
 
 // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
@@ -140,8 +164,8 @@ void TileDisplay::add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm:
   if (coarse_ == nullptr || id.level() == coarse_->level() || (lit.has_sharp && lit.has_soft)) return;
   const auto guess = coarse_->guess(PatchId{patch}, id.level(), at);
   if (!guess) return;
-  if (!lit.has_sharp) lit.sharp = from_guess(guess->sharp, guess->sharp_spread);
-  if (!lit.has_soft) lit.soft = from_guess(guess->soft, guess->soft_spread);
+  if (!lit.has_sharp) lit.sharp = sharp_of(*guess);
+  if (!lit.has_soft) lit.soft = soft_of(*guess);
   lit.has_sharp = lit.has_soft = true;
 }
 
@@ -177,12 +201,25 @@ void TileDisplay::shade_slot(TileId id, const LevelTiles& level, SlotColours& co
   }
 }
 
+double TileDisplay::fill_square(const TexelMask& mask, const SlotColours& colours,
+                                const std::array<bool, kSlotTexels>& known) const {
+  FillError fill;
+  for (int t = 0; t < kTileTexels; ++t) {
+    const auto at = static_cast<std::size_t>((t / kTileSize + 1) * kSlotSize + t % kTileSize + 1);
+    const bool wanted = mask.test(t) && known[at];
+    if (wanted && !(around_[4].facts && around_[4].facts->patch[static_cast<std::size_t>(t)] == kNobody))
+      fill.see(colours.fill.value[at]);
+  }
+  return fill.square();
+}
+
 float TileDisplay::error_of(const TexelMask& mask, const SlotColours& colours,
                             const std::array<bool, kSlotTexels>& known, float& samples) const {
   double squares = 0;
   double smear = 0;
   double count = 0;
   int texels = 0;
+  int filled = 0;
   for (int t = 0; t < kTileTexels; ++t) {
     if (!mask.test(t)) continue;
     const auto at = static_cast<std::size_t>((t / kTileSize + 1) * kSlotSize + t % kTileSize + 1);
@@ -190,7 +227,7 @@ float TileDisplay::error_of(const TexelMask& mask, const SlotColours& colours,
     ++texels;
     if (around_[4].light) count += around_[4].light->count(Layer::kSoft, t);
     if (!known[at]) {
-      squares += 0.25 * 0.25;  // filled from neighbours: nothing is known of it
+      ++filled;
       continue;
     }
     const auto& shown = colours.fill.value[at];
@@ -198,6 +235,9 @@ float TileDisplay::error_of(const TexelMask& mask, const SlotColours& colours,
     smear += std::copysign(display_square(shown, std::abs(colours.smear[at])), double{colours.smear[at]});
   }
   if (texels == 0) return samples = 0;
+  // They have the errors of those they are filled from besides.
+  if (filled < texels) squares *= static_cast<double>(texels) / (texels - filled);
+  if (filled > 0) squares += filled * fill_square(mask, colours, known);
   samples = static_cast<float>(count / texels);
   return static_cast<float>(std::sqrt((squares + std::max(smear, 0.0)) / texels));
 }

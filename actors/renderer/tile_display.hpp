@@ -75,6 +75,9 @@ class TileDisplay {
   [[nodiscard]] static Lit light_of(const Neighbour& from, int texel, const FilteredTexel& filtered);
   void add_guess(Lit& lit, TileId id, std::uint32_t patch, const glm::vec2& at) const;
   void shade_slot(TileId id, const LevelTiles& level, struct SlotColours& colours);
+  // Square error of the display values of texels that nothing is known of.
+  [[nodiscard]] double fill_square(const TexelMask& mask, const struct SlotColours& colours,
+                                   const std::array<bool, kSlotTexels>& known) const;
   [[nodiscard]] float error_of(const TexelMask& mask, const struct SlotColours& colours,
                                const std::array<bool, kSlotTexels>& known, float& samples) const;
 

@@ -122,12 +122,15 @@ inline void light(LitView& view, const TileMasks& masks, std::uint32_t samples) 
     if (s.image) view.images.put(s);
 }
 
-/// The coarse level as the renderer brings it on: rounds 1, 2, 4, ... each reading what the one before left.
-inline void light_coarse(LitView& view, renderer::TileSurfaces& surfaces, std::uint32_t rounds) {
+/// The coarse level as the renderer brings it on: rounds 1, 2, 4, ... each reading what the one before left. Returns
+/// the last one's light; null without rounds.
+inline std::shared_ptr<const renderer::StoredLight> light_coarse(LitView& view, renderer::TileSurfaces& surfaces,
+                                                                 std::uint32_t rounds) {
   const int level = view.world.layout->coarse_level();
   const auto tiles = renderer::level_tiles_of(*view.world.layout).back();
   auto& store = *view.world.store;
   renderer::TileFactsCache facts(std::size_t{tiles.x} * tiles.y + 16);
+  std::shared_ptr<const renderer::StoredLight> last;
   for (std::uint32_t n = 1; n <= rounds; n *= 2) {
     atlas::parallel_for(std::size_t{tiles.x} * tiles.y, kThreads, [&](std::size_t i) {
       const renderer::trace::DenormalsAreZero denormals;
@@ -147,7 +150,9 @@ inline void light_coarse(LitView& view, renderer::TileSurfaces& surfaces, std::u
         light->put(tile.index(), renderer::stored_texels(*stored, display.filtered()));
     });
     surfaces.use_stored_light(light);
+    last = light;
   }
+  return last;
 }
 
 }  // namespace darm::bench

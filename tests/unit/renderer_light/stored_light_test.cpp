@@ -145,6 +145,32 @@ TEST(StoredLight, GuessLeavesOutWhatIsNotKnown) {
   EXPECT_FLOAT_EQ(guess->sharp.x, 4.0f);
   EXPECT_FLOAT_EQ(guess->soft.x, 5.0f);
   EXPECT_NEAR(guess->sharp_spread, 0.0f, 1e-5f);
+  EXPECT_FALSE(guess->surrounded) << "that light is smooth is not known";
+}
+
+TEST(StoredLight, AGuessIsAsSureAsLightIsSmoothAround) {
+  const Room room(matte(0.5f), 128);
+  const PatchId patch = room.layout->patch_of(0, 0, true);
+  const glm::vec2 uv = room.layout->patch_uv(0, 0, 0.3f, 0.3f);
+  const glm::vec2 fine = room.layout->texel_at(patch, 0, uv);
+  const auto even = room.lit({glm::vec3(4.0f), glm::vec3(5.0f), true}).guess(patch, 0, fine);
+  ASSERT_TRUE(even && even->surrounded);
+  EXPECT_LT(sharp_of(*even).variance, 0.001f * 16);
+  // A slope of one and three a texel, at a value of some tens: its spread is the greater part of the error.
+  const auto slope = sloping(room.layout).guess(patch, 0, fine);
+  ASSERT_TRUE(slope && slope->surrounded);
+  const glm::vec2 part = glm::fract(room.layout->texel_at(patch, room.layout->coarse_level(), uv) - 0.5f);
+  // Along an axis, positions -1, 0, 1, 2 with weights (1 - p, 1, 1, p) / 3.
+  const auto around = [](float p) {
+    const float mean = (-(1 - p) + 1 + 2 * p) / 3;
+    return ((1 - p) + 1 + 4 * p) / 3 - mean * mean;
+  };
+  EXPECT_NEAR(slope->sharp_around, around(part.x) + 9 * around(part.y), 0.02f);
+  EXPECT_GT(sharp_of(*slope).variance, 0.5f * slope->sharp_spread);
+  // Smooth here, with a step beside: what is finer may have it.
+  LightGuess beside = *even;
+  beside.sharp_around = 4;
+  EXPECT_GT(sharp_of(beside).variance, 4 * sharp_of(*even).variance);
 }
 
 TEST(StoredLight, TexelsWithoutSamplesStartFromItAndKeepTheirAlbedo) {
@@ -166,7 +192,8 @@ TEST(StoredLight, TexelsWithoutSamplesStartFromItAndKeepTheirAlbedo) {
   const float albedo = facts.find(tile)->albedo(5 * kTileSize + 5).x;
   EXPECT_EQ(picture->image->rgb[(6 * kSlotSize + 6) * 3], srgb_code(0.4f * albedo));
   EXPECT_EQ(picture->samples, 0.0f);
-  EXPECT_GT(picture->error, 0.01f) << "it is only a guess";
+  EXPECT_GT(picture->error, 0.002f) << "it is only a guess";
+  EXPECT_LT(picture->error, 0.01f) << "but light is the same all around";
   std::filesystem::remove_all(dir);
 }
 

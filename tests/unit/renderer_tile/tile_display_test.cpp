@@ -209,6 +209,32 @@ TEST_F(TileDisplayTest, error_is_that_of_a_pixel_which_reads_five_texels) {
   }
 }
 
+TEST_F(TileDisplayTest, filled_texels_are_off_by_as_much_as_the_known_ones_differ) {
+  float spread = 0;
+  const auto light_of = [&](TileId id, int t) { return 0.3f * (1 + spread * (2 * noise_of(id, t, 0) - 1)); };
+  world_.world.light = [&](TileId id, int t, std::uint32_t) { return TexelLight{glm::vec3(light_of(id, t)), {}}; };
+  TexelMask known;
+  for (int t = 0; t < kTileTexels; t += 3) known.set(t % kTileSize, t / kTileSize);
+  const auto error_and_truth = [&](float by) {
+    spread = by;
+    shade(middle_, 8, known);
+    const auto picture = draw(middle_, 0);
+    double sum = 0;
+    for (int t = 0; t < kTileTexels; ++t)
+      sum += std::pow((code(picture, t % kTileSize, t / kTileSize) - srgb_code(light_of(middle_, t))) / 255.0, 2);
+    return std::pair(double{picture.error}, std::sqrt(sum / kTileTexels));
+  };
+  const auto [flat, nothing] = error_and_truth(0);
+  EXPECT_LT(nothing, 0.002);
+  EXPECT_LT(flat, 0.02) << "a quarter of the range, if they told nothing of each other";
+  TearDown();
+  SetUp();
+  const auto [rough, truth] = error_and_truth(0.8f);
+  EXPECT_GT(truth, 0.05);
+  EXPECT_GT(rough / truth, 0.7);
+  EXPECT_LT(rough / truth, 1.4);
+}
+
 TEST_F(TileDisplayTest, noise_over_white_is_no_error) {
   float scale = 0;
   world_.world.light = [&](TileId id, int t, std::uint32_t s) {
