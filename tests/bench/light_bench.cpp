@@ -8,6 +8,7 @@
 //   gain    how much sooner stored light is at an equal error: ratio of us * rmse^2
 //   bias_db -20 log10 of the RMS difference of display values, noise of both sides cancelled by independent halves
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -21,6 +22,8 @@ namespace {
 using namespace darm;
 using namespace darm::bench;
 
+using TexelName = std::pair<TileId, int>;
+
 struct Estimate {
   glm::dvec3 half[2]{};      // means of sharp + soft, exposed
   double soft_variance = 0;  // of one sample, mean of channels
@@ -30,8 +33,6 @@ struct Tally {
   std::vector<Estimate> texels;
   double seconds = 0;
 };
-
-using TexelName = std::pair<TileId, int>;
 
 std::vector<TexelName> pick_texels(const LitView& view, std::size_t count) {
   std::vector<TexelName> seen;
@@ -44,35 +45,48 @@ std::vector<TexelName> pick_texels(const LitView& view, std::size_t count) {
   return seen;
 }
 
-Estimate estimate(const renderer::TileSurface& surface, int texel, std::uint32_t samples, float exposure) {
+// Of two seeds: halves of one sequence would not be independent, since what one has left out the other has.
+using Halves = std::array<std::shared_ptr<renderer::TileSurfaces>, 2>;
+
+Halves make_halves(const LitView& view, std::uint64_t seed) {
+  Halves halves;
+  for (std::size_t h = 0; h < halves.size(); ++h)
+    halves[h] = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, seed + 2 * h);
+  return halves;
+}
+
+Estimate estimate(const Halves& halves, const TexelName& name, std::uint32_t samples, float exposure) {
   Estimate e;
   glm::dvec3 mean(0.0), m2(0.0);
   std::uint32_t taken = 0;
+  const int texel = name.second;
   glm::vec3 albedo(0.0f);
-  for (std::uint32_t i = 0; i < 8; ++i) albedo += surface.albedo(texel, i).value_or(glm::vec3(0.0f)) / 8.0f;
-  for (std::uint32_t i = 0; i < samples; ++i) {
-    const auto sharp = surface.sharp(texel, i), soft = surface.soft(texel, i);
-    if (!sharp || !soft) continue;
-    e.half[i % 2] += glm::dvec3((*sharp + *soft) * albedo) * double(exposure) * 2.0 / double(samples);
-    const glm::dvec3 x = glm::dvec3(*soft * albedo) * double(exposure);
-    const glm::dvec3 d = x - mean;
-    mean += d / double(++taken);
-    m2 += d * (x - mean);
+  for (std::size_t h = 0; h < halves.size(); ++h) {
+    const auto surface = halves[h]->tile(name.first);
+    for (std::uint32_t i = 0; i < 8 && h == 0; ++i)
+      albedo += surface->albedo(texel, i).value_or(glm::vec3(0.0f)) / 8.0f;
+    for (std::uint32_t i = 0; i < samples / 2; ++i) {
+      const auto sharp = surface->sharp(texel, i), soft = surface->soft(texel, i);
+      if (!sharp || !soft) continue;
+      e.half[h] += glm::dvec3((*sharp + *soft) * albedo) * double(exposure) * 2.0 / double(samples);
+      const glm::dvec3 x = glm::dvec3(*soft * albedo) * double(exposure);
+      const glm::dvec3 d = x - mean;
+      mean += d / double(++taken);
+      m2 += d * (x - mean);
+    }
   }
   if (taken > 1) e.soft_variance = (m2.x + m2.y + m2.z) / (3.0 * double(taken - 1));
   return e;
 }
 
-Tally sample_all(const renderer::TileSurfaces& surfaces, const std::vector<TexelName>& texels, std::uint32_t samples,
-                 float exposure) {
+Tally sample_all(const Halves& halves, const std::vector<TexelName>& texels, std::uint32_t samples, float exposure) {
   Tally tally;
   tally.texels.resize(texels.size());
   std::vector<double> seconds(texels.size());
   atlas::parallel_for(texels.size(), kThreads, [&](std::size_t i) {
     const renderer::trace::DenormalsAreZero denormals;
-    const auto surface = surfaces.tile(texels[i].first);
     const auto begin = std::chrono::steady_clock::now();
-    tally.texels[i] = estimate(*surface, texels[i].second, samples, exposure);
+    tally.texels[i] = estimate(halves, texels[i], samples, exposure);
     seconds[i] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   });
   for (const double s : seconds) tally.seconds += s;
@@ -113,13 +127,14 @@ Result<void> run(char** argv) {
   const auto samples = static_cast<std::uint32_t>(std::strtoul(argv[8], nullptr, 10));
   const auto texels = pick_texels(view, std::strtoul(argv[7], nullptr, 10));
   if (texels.empty() || samples < 4) return fail("nothing is seen, or SAMPLES is under 4");
-  const auto plain = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, 1);
-  const auto fast = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, 2);
+  const auto plain = make_halves(view, 1);
+  const auto fast = make_halves(view, 2);
   const auto begin = std::chrono::steady_clock::now();
-  light_coarse(view, *fast, static_cast<std::uint32_t>(std::strtoul(argv[6], nullptr, 10)));
+  fast[1]->use_stored_light(
+      light_coarse(view, *fast[0], static_cast<std::uint32_t>(std::strtoul(argv[6], nullptr, 10))));
   const double lit = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  const auto a = sample_all(*fast, texels, samples, view.world.exposure);
-  const auto b = sample_all(*plain, texels, samples, view.world.exposure);
+  const auto a = sample_all(fast, texels, samples, view.world.exposure);
+  const auto b = sample_all(plain, texels, samples, view.world.exposure);
   const double n = double(texels.size()) * samples;
   std::printf("{\"camera\": \"%s\", \"q\": %g, \"texels\": %zu, \"samples\": %u, \"coarse_seconds\": %.2f, ", argv[3],
               double(view.world.layout->q), texels.size(), samples, lit);

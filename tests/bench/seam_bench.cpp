@@ -12,6 +12,7 @@
 //   draw_us  thread CPU time of a picture, mean of tiles
 //   estimate RMS of the error that tiles say they have, over the true one of their measured texels
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -132,20 +133,27 @@ std::vector<Truth> pick_texels(const LitView& view, std::size_t tiles, std::size
   return all;
 }
 
+// Halves of one sequence would not be independent: what one has left out the other has.
+constexpr std::array<std::uint64_t, 2> kTruthSeeds{1, 3};
+
 void trace_truth(const LitView& view, std::vector<Truth>& texels, std::uint32_t samples) {
-  const auto surfaces = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, 1);
+  std::array<std::shared_ptr<renderer::TileSurfaces>, 2> halves;
+  for (std::size_t h = 0; h < 2; ++h)
+    halves[h] =
+        renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, kTruthSeeds[h]);
   atlas::parallel_for(texels.size(), kThreads, [&](std::size_t i) {
     const renderer::trace::DenormalsAreZero denormals;
     Truth& t = texels[i];
-    const auto surface = surfaces->tile(t.tile);
-    glm::dvec3 sharp[2]{}, soft[2]{};
-    for (std::uint32_t n = 0; n < samples; ++n) {
-      sharp[n % 2] += glm::dvec3(surface->sharp(t.texel, n).value_or(glm::vec3(0.0f)));
-      soft[n % 2] += glm::dvec3(surface->soft(t.texel, n).value_or(glm::vec3(0.0f)));
-    }
-    for (int h = 0; h < 2; ++h) {
-      t.sharp[h] = glm::vec3(sharp[h] * (2.0 / samples));
-      t.soft[h] = glm::vec3(soft[h] * (2.0 / samples));
+    const auto surface = halves[0]->tile(t.tile);
+    for (std::size_t h = 0; h < 2; ++h) {
+      const auto from = halves[h]->tile(t.tile);
+      glm::dvec3 sharp(0.0), soft(0.0);
+      for (std::uint32_t n = 0; n < samples / 2; ++n) {
+        sharp += glm::dvec3(from->sharp(t.texel, n).value_or(glm::vec3(0.0f)));
+        soft += glm::dvec3(from->soft(t.texel, n).value_or(glm::vec3(0.0f)));
+      }
+      t.sharp[h] = glm::vec3(sharp / double(samples / 2));
+      t.soft[h] = glm::vec3(soft / double(samples / 2));
     }
     for (std::uint32_t n = 0; n < 32; ++n) {  // the product's own last number of points
       t.albedo += surface->albedo(t.texel, n).value_or(glm::vec3(0.0f)) / 32.0f;
@@ -315,7 +323,7 @@ Result<void> run(int argc, char** argv) {
   auto texels = pick_texels(view, number(6), number(7), number(9));
   if (texels.empty() || samples < 2) return fail("nothing is seen, or SAMPLES is under 2");
   const std::string name =
-      std::string(argv[4]) + "/seam-" + argv[3] + "-" + argv[6] + "-" + argv[7] + "-" + argv[8] + "-" + argv[9];
+      std::string(argv[4]) + "/seam-truth-" + argv[3] + "-" + argv[6] + "-" + argv[7] + "-" + argv[8] + "-" + argv[9];
   truth_from_file_or_traced(view, name + ".truth", texels, samples);
   const auto surfaces = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, 2);
   light_coarse(view, *surfaces, kCoarseRounds);
