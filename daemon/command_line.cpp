@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdio>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "daemon/config/load.hpp"
@@ -191,6 +193,19 @@ void add_accuracy(CLI::App& app, AccuracyCommand& command, Common& common, std::
   app.add_flag("--json", command.json, "accuracy.json on standard output, no progress");
 }
 
+// What is wrong with the first argument, if it is to be a command; empty: nothing.
+std::string fault_of_command(const CLI::App& app, int argc, char** argv) {
+  const std::string_view first = argc > 1 ? argv[1] : "";
+  if (first.starts_with('-')) return {};
+  std::string known;
+  for (const auto* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == first) return {};
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  return (first.empty() ? "no command" : fmt::format("\"{}\": no such command", first)) + "; known are " + known +
+         "; darmd COMMAND --help tells more";
+}
+
 }  // namespace
 
 Command parse_command_line(int argc, char** argv) {
@@ -219,6 +234,10 @@ Command parse_command_line(int argc, char** argv) {
   auto* accuracy_app = app.add_subcommand("accuracy", "measure what accuracy costs in time, and write a report");
   add_accuracy(*accuracy_app, accuracy, accuracy_common, size);
 
+  if (const std::string fault = fault_of_command(app, argc, argv); !fault.empty()) {
+    std::fprintf(stderr, "darmd: %s\n", fault.c_str());
+    return Exit{2};
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -131,10 +131,15 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
   const bool first = coarse_ == nullptr;
   coarse_ = std::move(message.picture);
   if (!first) return;
-  // Clients show it at once: what they are told next is of that.
+  // Clients show it at once, and the next frame may be long in coming: they are told what is to be told of it, in
+  // answer to no camera.
   for (auto& [id, stream] : streams_) estimate_errors(*stream, 0);
-  for (auto& [id, session] : sessions_)
+  for (auto& [id, session] : sessions_) {
+    ViewAnswer none;
+    none.session = id;
+    if (session->posed) tell_no_change(none);
     if (session->view_layer) send_view_work(*session);
+  }
 }
 
 void TileSchedulerActor::on(FrameDone&& message) {

@@ -7,6 +7,10 @@
 //   rmse    of one sample of soft light in display units (linear, exposed), as its own variance says
 //   gain    how much sooner stored light is at an equal error: ratio of us * rmse^2
 //   bias_db -20 log10 of the RMS difference of display values, noise of both sides cancelled by independent halves
+//           (null: nothing is left)
+//   bias_db_bound  the same with two standard errors more: with 97.7 % confidence there is no more bias
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -98,14 +102,23 @@ double shown(double linear) {
   return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
 }
 
-double bias_db(const Tally& a, const Tally& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.texels.size(); ++i)
+// Mean square difference of display values over texels, and its standard error.
+std::pair<double, double> square_bias(const Tally& a, const Tally& b) {
+  double mean = 0, m2 = 0;
+  for (std::size_t i = 0; i < a.texels.size(); ++i) {
+    double square = 0;
     for (int c = 0; c < 3; ++c)
-      sum += (shown(a.texels[i].half[0][c]) - shown(b.texels[i].half[0][c])) *
-             (shown(a.texels[i].half[1][c]) - shown(b.texels[i].half[1][c]));
-  return -10 * std::log10(std::max(sum / (3.0 * double(a.texels.size())), 1e-12));
+      square += (shown(a.texels[i].half[0][c]) - shown(b.texels[i].half[0][c])) *
+                (shown(a.texels[i].half[1][c]) - shown(b.texels[i].half[1][c])) / 3;
+    const double d = square - mean;
+    mean += d / double(i + 1);
+    m2 += d * (square - mean);
+  }
+  const auto n = double(a.texels.size());
+  return {mean, n > 1 ? std::sqrt(m2 / (n - 1) / n) : 1.0};
 }
+
+std::string decibels(double square) { return square > 0 ? fmt::format("{:.1f}", -10 * std::log10(square)) : "null"; }
 
 double ratio_of_means(const Tally& a, const Tally& b) {
   double sums[2] = {0, 0};
@@ -136,12 +149,14 @@ Result<void> run(char** argv) {
   const auto a = sample_all(fast, texels, samples, view.world.exposure);
   const auto b = sample_all(plain, texels, samples, view.world.exposure);
   const double n = double(texels.size()) * samples;
+  const auto [square, error] = square_bias(a, b);
   std::printf("{\"camera\": \"%s\", \"q\": %g, \"texels\": %zu, \"samples\": %u, \"coarse_seconds\": %.2f, ", argv[3],
               double(view.world.layout->q), texels.size(), samples, lit);
   std::printf("\"stored\": {\"us\": %.2f, \"rmse\": %.4f}, \"traced\": {\"us\": %.2f, \"rmse\": %.4f}, ",
               a.seconds / n * 1e6, rmse(a), b.seconds / n * 1e6, rmse(b));
-  std::printf("\"gain\": %.2f, \"mean_ratio\": %.4f, \"bias_db\": %.1f}\n",
-              b.seconds * rmse(b) * rmse(b) / (a.seconds * rmse(a) * rmse(a)), ratio_of_means(a, b), bias_db(a, b));
+  std::printf("\"gain\": %.2f, \"mean_ratio\": %.4f, \"bias_db\": %s, \"bias_db_bound\": %s}\n",
+              b.seconds * rmse(b) * rmse(b) / (a.seconds * rmse(a) * rmse(a)), ratio_of_means(a, b),
+              decibels(square).c_str(), decibels(square + 2 * error).c_str());
   return {};
 }
 

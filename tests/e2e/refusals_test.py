@@ -27,6 +27,10 @@ class Refusals(unittest.TestCase):
                     self.assertIn(words, said)
             self.assertEqual(list(Path(folder).iterdir()), [])
 
+    def test_commands_that_are_none(self):
+        self.check([(["darmd", "bogus"], '"bogus": no such command; known are serve'),
+                    (["darmd"], "no command; known are serve")])
+
     def test_numbers_that_are_none_or_out_of_range(self):
         self.check([
             (RENDER + ["--until-psnr", "nan"], "--until-psnr"),

@@ -47,6 +47,26 @@ TEST_F(PatientTileScheduler, TheFirstFrameDoesNotWaitLongForPictures) {
   EXPECT_EQ(heard_.frames[first_].back().answers.size(), 1u);
 }
 
+TEST_F(TileScheduler, WhoHasNothingYetIsToldAtOnceHowFarTheCoarsePictureIsOff) {
+  open(ann_);
+  open(SessionId{2});  // has sent no camera: there is no view to tell of
+  look(ann_, 1, ahead_);
+  finish_frame(first_);
+  const float unlit = heard_.frames[first_].back().errors.at(0).error;
+  const auto told_before = heard_.no_changes.size();
+  auto coarse = std::make_shared<CoarseLuma>();
+  scheduler_.tell(CoarsePictured(coarse));
+  system_.run_until_idle();
+  ASSERT_EQ(heard_.no_changes.size(), told_before + 1);
+  const auto& told = heard_.no_changes.back();
+  EXPECT_EQ(told.answer.session, ann_);
+  EXPECT_EQ(told.answer.sequence, 0u) << "it answers no camera";
+  EXPECT_LT(told.error, unlit);
+  scheduler_.tell(CoarsePictured(coarse));
+  system_.run_until_idle();
+  EXPECT_EQ(heard_.no_changes.size(), told_before + 1) << "later ones come with frames";
+}
+
 TEST_F(TileScheduler, SendsTilesOnceTheyHavePictures) {
   open(ann_);
   look(ann_, 1, ahead_);
