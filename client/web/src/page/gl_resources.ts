@@ -53,6 +53,16 @@ export function makeTexture(gl: Gl, format: number, width: number, height: numbe
   return texture;
 }
 
+/** Sets all channels of a texture that can be drawn into to `value`. What is bound to draw into is unbound. */
+export function clearTexture(gl: Gl, texture: WebGLTexture, value: number): void {
+  const frame = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+  gl.clearBufferfv(gl.COLOR, 0, [value, value, value, value]);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.deleteFramebuffer(frame);
+}
+
 export function put(gl: Gl, texture: WebGLTexture, x: number, y: number, width: number, height: number, format: number,
                     type: number, data: ArrayBufferView): void {
   gl.bindTexture(gl.TEXTURE_2D, texture);

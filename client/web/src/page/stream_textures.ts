@@ -2,7 +2,7 @@
 import {kSlotSize, kTableWidth} from '../shared/limits.js';
 import type {FrameUpdate, PageRows, Planes, SceneShape, SlotBytes, StreamShape} from '../shared/scene.js';
 import type {Gl} from './gl_resources.js';
-import {makeTexture, put} from './gl_resources.js';
+import {clearTexture, makeTexture, put} from './gl_resources.js';
 import {kUnits} from './programs.js';
 
 function plane(gl: Gl, width: number, height: number): WebGLTexture {
@@ -95,11 +95,11 @@ export class StreamTextures {
   /** Sizes of the session's streams; what slots held before means nothing once its first frame comes. */
   begin(shape: StreamShape, layer: 'shared' | 'view'): void {
     if (layer === 'shared' && this.scene.hasAlpha) {
-      this.coverage = this.filled(this.coverage, this.coverageSize, shape.size, this.gl.R8, this.gl.RED, 1, 255);
+      this.coverage = this.filled(this.coverage, this.coverageSize, shape.size, this.gl.R8, 1);
       this.coverageSize = shape.size;
     }
     if (layer === 'view' && this.scene.hasClear) {
-      this.through = this.filled(this.through, this.throughSize, shape.viewSize, this.gl.RGB8, this.gl.RGB, 3, 0);
+      this.through = this.filled(this.through, this.throughSize, shape.viewSize, this.gl.RGB8, 0);
       this.throughSize = shape.viewSize;
     }
   }
@@ -176,16 +176,15 @@ export class StreamTextures {
   }
 
   // A texture of one value everywhere, made anew where the size differs.
-  private filled(old: WebGLTexture | null, oldSize: number, size: number, internal: number, format: number,
-                 channels: number, value: number): WebGLTexture {
+  private filled(old: WebGLTexture | null, oldSize: number, size: number, internal: number,
+                 value: number): WebGLTexture {
     const gl = this.gl;
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     let texture = old;
     if (texture === null || oldSize !== size) {
       gl.deleteTexture(old);
       texture = makeTexture(gl, internal, size, size, gl.LINEAR);
     }
-    put(gl, texture, 0, 0, size, size, format, gl.UNSIGNED_BYTE, new Uint8Array(size * size * channels).fill(value));
+    clearTexture(gl, texture, value);
     return texture;
   }
 
