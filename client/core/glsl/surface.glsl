@@ -74,6 +74,7 @@ void main() {
   float coverage = 1.0;
   float source = 0.0;
   bool in_slot = false;
+#ifndef COARSE
   for (int k = 0; k < 4; ++k) {
     int l = level + k;
     if (l >= u_level_count) break;
@@ -86,6 +87,7 @@ void main() {
     in_slot = true;
     break;
   }
+#endif
   if (!in_slot && u_coarse_size.x > 0.0) {
     int last = u_level_count - 1;
     vec2 where = texel_of(patch_id, last) / u_coarse_size;

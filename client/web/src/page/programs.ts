@@ -19,6 +19,8 @@ export interface SurfaceVariant {
   linear: boolean;
   /** Writes the class of each sample instead of its colour. */
   stats: boolean;
+  /** Nothing but CoarseTex is there: a third of the program, and ready the sooner. */
+  coarse: boolean;
   /** Adds the private layer. */
   view: boolean;
   /** Writes what a clear surface passes of the light behind it. */

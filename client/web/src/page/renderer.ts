@@ -249,7 +249,7 @@ export class Renderer {
     const view = this.textures.hasView && pass !== 'stats';
     const program = pass === 'depth' ? this.programs.depth : this.programs.surface({
       mask: instance.alphaMode === 'mask', blend: blend && instance.alphaMode === 'blend', linear: this.linear,
-      stats: pass === 'stats', view, through: pass === 'through'});
+      stats: pass === 'stats', coarse: this.textures.sharedSize === 0, view, through: pass === 'through'});
     if (program !== this.current) {
       program.use();
       if (pass !== 'depth') this.setFrameUniforms(program, frame);

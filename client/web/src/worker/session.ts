@@ -35,7 +35,7 @@ export class Session implements SocketOwner {
   private readonly socket: StreamSocket;
   private readonly buffers = new BufferPool();
   private readonly coarseDecoder = new PictureDecoder((bytes) => new ArrayBuffer(bytes), true);
-  private work: Promise<void> = Promise.resolve();
+  private work: Promise<void>;
   private framesWaiting = 0;
   private epoch = 0;  // counts sessions: what was queued for an older one is dropped
   private shape: StreamShape = {size: 0, viewSize: 0};
@@ -52,9 +52,11 @@ export class Session implements SocketOwner {
   private readonly traffic: Traffic = {received: 0, stream: 0, geometry: 0, coarse: 0, decodeMs: 0,
     framesLost: 0};
 
+  /** Nothing that comes is looked at before `ready`. */
   constructor(url: string, private readonly name: string, private readonly chroma444: boolean, pose: Pose | null,
-              private readonly post: Post) {
+              private readonly post: Post, ready: Promise<void> = Promise.resolve()) {
     this.pose = pose;
+    this.work = ready;
     this.socket = new StreamSocket(url, this);
     this.socket.open();
     self.setInterval(() => this.tellTraffic(), kTrafficEveryMs);

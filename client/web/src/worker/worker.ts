@@ -8,11 +8,10 @@ let session: Session | null = null;
 
 const post = (message: FromWorker, transfer: Transferable[] = []): void => self.postMessage(message, {transfer});
 
-self.onmessage = async (event: MessageEvent<ToWorker>) => {
+self.onmessage = (event: MessageEvent<ToWorker>) => {
   const m = event.data;
   if (m.type === 'open') {
-    await MeshoptDecoder.ready;
-    session = new Session(m.url, m.name, m.chroma444, m.pose, post);
+    session = new Session(m.url, m.name, m.chroma444, m.pose, post, MeshoptDecoder.ready);
   } else if (session === null) {
     return;
   } else if (m.type === 'camera') {
