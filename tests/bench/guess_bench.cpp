@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <random>
 
 #include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/sampling.hpp"
@@ -27,19 +26,6 @@ struct Guessed {
   float variation = -1;        // none: nothing is known there
   double said = 0, truth = 0;  // square errors, display values
 };
-
-using TexelName = std::pair<TileId, int>;
-
-std::vector<TexelName> pick_texels(const LitView& view, std::size_t count) {
-  std::vector<TexelName> seen;
-  for (const auto& [tile, mask] : sharp_texels(view))
-    for (int t = 0; t < kTileTexels && tile.level() < view.world.layout->coarse_level(); ++t)
-      if (mask.test(t)) seen.emplace_back(tile, t);
-  std::shuffle(seen.begin(), seen.end(), std::mt19937(7));
-  seen.resize(std::min(seen.size(), count));
-  std::sort(seen.begin(), seen.end());
-  return seen;
-}
 
 std::optional<renderer::LightGuess> guess_of(const LitView& view, const renderer::StoredLight& coarse,
                                              const renderer::TileFacts& facts, const TexelName& name) {
@@ -58,9 +44,6 @@ double said_of(float grey, float variance) {
   const float above = renderer::srgb(grey + off) - middle, below = renderer::srgb(std::max(grey - off, 0.0f)) - middle;
   return 0.5 * (double{above} * double{above} + double{below} * double{below});
 }
-
-// Of two seeds: halves of one sequence would not be independent.
-using Halves = std::array<std::shared_ptr<renderer::TileSurfaces>, 2>;
 
 Guessed compare(const renderer::LightGuess& guess, const Halves& halves, const TexelName& name, std::uint32_t samples,
                 float exposure) {
@@ -109,11 +92,9 @@ Result<void> run(char** argv) {
   if (auto opened = open_view(view, argv[1], argv[2], argv[3], argv[4], std::strtod(argv[5], nullptr)); !opened)
     return opened;
   const auto samples = static_cast<std::uint32_t>(std::strtoul(argv[8], nullptr, 10));
-  const auto texels = pick_texels(view, std::strtoul(argv[7], nullptr, 10));
+  const auto texels = random_texels(view, std::strtoul(argv[7], nullptr, 10), false);
   if (texels.empty() || samples < 4) return fail("nothing is seen, or SAMPLES is under 4");
-  Halves halves;
-  for (std::size_t h = 0; h < halves.size(); ++h)
-    halves[h] = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, 2 + h);
+  const Halves halves = make_halves(view, 2);
   const auto coarse = light_coarse(view, *halves[0], static_cast<std::uint32_t>(std::strtoul(argv[6], nullptr, 10)));
   if (!coarse) return fail("ROUNDS is under 1");
   halves[1]->use_stored_light(coarse);

@@ -12,12 +12,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <random>
 
 #include "tests/bench/lit_view.hpp"
 
@@ -25,8 +23,6 @@ namespace {
 
 using namespace darm;
 using namespace darm::bench;
-
-using TexelName = std::pair<TileId, int>;
 
 struct Estimate {
   glm::dvec3 half[2]{};      // means of sharp + soft, exposed
@@ -37,27 +33,6 @@ struct Tally {
   std::vector<Estimate> texels;
   double seconds = 0;
 };
-
-std::vector<TexelName> pick_texels(const LitView& view, std::size_t count) {
-  std::vector<TexelName> seen;
-  for (const auto& [tile, mask] : sharp_texels(view))
-    for (int t = 0; t < kTileTexels; ++t)
-      if (mask.test(t)) seen.emplace_back(tile, t);
-  std::shuffle(seen.begin(), seen.end(), std::mt19937(7));
-  seen.resize(std::min(seen.size(), count));
-  std::sort(seen.begin(), seen.end());
-  return seen;
-}
-
-// Of two seeds: halves of one sequence would not be independent, since what one has left out the other has.
-using Halves = std::array<std::shared_ptr<renderer::TileSurfaces>, 2>;
-
-Halves make_halves(const LitView& view, std::uint64_t seed) {
-  Halves halves;
-  for (std::size_t h = 0; h < halves.size(); ++h)
-    halves[h] = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, seed + 2 * h);
-  return halves;
-}
 
 Estimate estimate(const Halves& halves, const TexelName& name, std::uint32_t samples, float exposure) {
   Estimate e;
@@ -138,7 +113,7 @@ Result<void> run(char** argv) {
   if (auto opened = open_view(view, argv[1], argv[2], argv[3], argv[4], std::strtod(argv[5], nullptr)); !opened)
     return opened;
   const auto samples = static_cast<std::uint32_t>(std::strtoul(argv[8], nullptr, 10));
-  const auto texels = pick_texels(view, std::strtoul(argv[7], nullptr, 10));
+  const auto texels = random_texels(view, std::strtoul(argv[7], nullptr, 10), true);
   if (texels.empty() || samples < 4) return fail("nothing is seen, or SAMPLES is under 4");
   const auto plain = make_halves(view, 1);
   const auto fast = make_halves(view, 2);

@@ -4,8 +4,12 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
+#include <random>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -45,6 +49,31 @@ inline std::map<TileId, TexelMask> sharp_texels(const LitView& view) {
   for (std::size_t i = 0; i < seen.tiles().size(); ++i)
     if (!seen.uses()[i].sharp.empty()) out[seen.tiles()[i]] |= seen.uses()[i].sharp;
   return out;
+}
+
+using TexelName = std::pair<TileId, int>;
+
+/// At most `count` random texels that the view reads at their sharp level, in order; of the coarse level where
+/// `coarse`.
+inline std::vector<TexelName> random_texels(const LitView& view, std::size_t count, bool coarse) {
+  std::vector<TexelName> seen;
+  for (const auto& [tile, mask] : sharp_texels(view))
+    for (int t = 0; t < kTileTexels && (coarse || tile.level() < view.world.layout->coarse_level()); ++t)
+      if (mask.test(t)) seen.emplace_back(tile, t);
+  std::shuffle(seen.begin(), seen.end(), std::mt19937(7));
+  seen.resize(std::min(seen.size(), count));
+  std::sort(seen.begin(), seen.end());
+  return seen;
+}
+
+/// Surfaces whose samples are independent, by two seeds: of one sequence they would not be, since what one half has
+/// left out the other has.
+using Halves = std::array<std::shared_ptr<renderer::TileSurfaces>, 2>;
+inline Halves make_halves(const LitView& view, std::uint64_t seed) {
+  Halves halves;
+  for (std::size_t h = 0; h < halves.size(); ++h)
+    halves[h] = renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, seed + 2 * h);
+  return halves;
 }
 
 using TileMasks = std::unordered_map<TileId, TexelMask>;

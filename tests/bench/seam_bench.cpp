@@ -12,7 +12,6 @@
 //   draw_us  thread CPU time of a picture, mean of tiles
 //   estimate RMS of the error that tiles say they have, over the true one of their measured texels
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -133,14 +132,8 @@ std::vector<Truth> pick_texels(const LitView& view, std::size_t tiles, std::size
   return all;
 }
 
-// Halves of one sequence would not be independent: what one has left out the other has.
-constexpr std::array<std::uint64_t, 2> kTruthSeeds{1, 3};
-
 void trace_truth(const LitView& view, std::vector<Truth>& texels, std::uint32_t samples) {
-  std::array<std::shared_ptr<renderer::TileSurfaces>, 2> halves;
-  for (std::size_t h = 0; h < 2; ++h)
-    halves[h] =
-        renderer::make_scene_surfaces(view.world.scene, view.world.mapper, view.world.transport, kTruthSeeds[h]);
+  const Halves halves = make_halves(view, 1);
   atlas::parallel_for(texels.size(), kThreads, [&](std::size_t i) {
     const renderer::trace::DenormalsAreZero denormals;
     Truth& t = texels[i];
