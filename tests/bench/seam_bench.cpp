@@ -208,9 +208,9 @@ Pictures light_and_draw(const LitView& view, const std::vector<Truth>& texels, c
     const auto& [tile, mask] = tiles[i];
     const auto surface = surfaces.tile(tile);
     auto progress = renderer::survey_tile(store, tile, mask, *surface);
-    if (progress.unshaded > 0) static_cast<void>(renderer::shade_tile(store, tile, mask, 1, *surface, count));
+    if (progress.unshaded > 0 && !renderer::shade_tile(store, tile, mask, 1, *surface, count)) return;
     for (std::uint32_t n = 1; count > 1 && n <= count; n *= 2)  // a tile's passes double, as the schedule's do
-      static_cast<void>(renderer::shade_tile(store, tile, mask, std::max(n / 2, 1u), *surface, count));
+      if (!renderer::shade_tile(store, tile, mask, std::max(n / 2, 1u), *surface, count)) return;
     if (const auto known = facts.get(tile, surfaces, store); known && known->learn_albedo(*surface, mask,
                                                                                           count <= 1   ? 2
                                                                                           : count < 16 ? 16
