@@ -210,13 +210,13 @@ def vault():
 def rib():
     """An arch across the vault, 0.3 m wide."""
     s = Shape()
-    r, w = 2.86, 0.15
+    r, w, depth = 2.86, 0.15, 0.14  # up to the vault, whose other side is in the sun
     def at(radius, x, v):
         a = v * math.pi
         return (x, 5 + radius * math.sin(a), -radius * math.cos(a))
-    s.grid(lambda u, v: at(r, -w + 2 * w * u, v), 2, 36)
-    s.grid(lambda u, v: at(r + 0.16 * u, w, v), 1, 36)
-    s.grid(lambda u, v: at(r + 0.16 * (1 - u), -w, v), 1, 36)
+    s.grid(lambda u, v: at(r, -w + 2 * w * u, v), 2, VAULT_STEPS)
+    s.grid(lambda u, v: at(r + depth * u, w, v), 1, VAULT_STEPS)
+    s.grid(lambda u, v: at(r + depth * (1 - u), -w, v), 1, VAULT_STEPS)
     return s
 
 
