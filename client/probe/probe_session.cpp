@@ -259,7 +259,7 @@ Result<void> Run::draw() {
 }
 
 Result<void> Run::note_series() {
-  SeriesPoint point{elapsed(), std::nullopt, report_.error};
+  SeriesPoint point{elapsed(), std::nullopt, report_.error, report_.resolution_error, report_.omitted_error};
   if (reference_ != nullptr) {
     const auto picture = renderer_->read_picture();
     if (!picture) return std::unexpected(picture.error());

@@ -55,6 +55,8 @@ struct SeriesPoint {
   double t = 0;
   std::optional<double> psnr;
   std::optional<double> error;  ///< the server's estimate at that time, if it has sent one
+  double resolution_error = 0;  ///< beside it, as in the report
+  double omitted_error = 0;
 };
 
 struct SessionReport {

@@ -137,7 +137,11 @@ std::string to_json(const Outcome& o) {
   j["lag_ms"] = lag_of(s.lag);
   j["series"] = Json::array();
   for (const auto& p : s.series)
-    j["series"].push_back({{"t", p.t}, {"psnr", optional(p.psnr)}, {"error", optional(p.error)}});
+    j["series"].push_back({{"t", p.t},
+                           {"psnr", optional(p.psnr)},
+                           {"error", optional(p.error)},
+                           {"resolution_error", p.resolution_error},
+                           {"omitted_error", p.omitted_error}});
   return j.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

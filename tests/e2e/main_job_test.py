@@ -21,6 +21,8 @@ class MainJob(WithDaemon):
                        "--ceiling-seconds", "4", "--ceiling-phystex", "4096")
         for key in KEYS:
             self.assertIn(key, report)
+        for point in report["series"]:
+            self.assertLessEqual({"t", "psnr", "error", "resolution_error", "omitted_error"}, point.keys())
         self.assertGreater(report["psnr"], 25.0)
         self.assertGreater(report["psnr"], report["ceiling_psnr"] - 3.0)
         self.assertLess(report["coarse_fraction"], 0.05)
