@@ -133,13 +133,12 @@ void TileSchedulerActor::on(CoarsePictured&& message) {
   if (!first) return;
   // Clients show it at once, and the next frame may be long in coming: they are told what is to be told of it, in
   // answer to no camera.
-  for (auto& [id, stream] : streams_) estimate_errors(*stream, 0);
-  for (auto& [id, session] : sessions_) {
-    ViewAnswer none;
-    none.session = id;
-    if (session->posed) tell_no_change(none);
-    if (session->view_layer) send_view_work(*session);
+  for (auto& [id, stream] : streams_) {
+    estimate_errors(*stream, 0);
+    tell_errors(*stream);
   }
+  for (auto& [id, session] : sessions_)
+    if (session->view_layer) send_view_work(*session);
 }
 
 void TileSchedulerActor::on(FrameDone&& message) {
@@ -148,6 +147,7 @@ void TileSchedulerActor::on(FrameDone&& message) {
     pace_.done(message.busy);
     stream.state.frame_done(message.frame, message.ok, message.settled);
     note_sent(stream, message);
+    if (stream.untold) tell_errors(stream);
     const auto waits = [](const Session* member) { return member->answer.has_value(); };
     if (stream.state.has_answers() || std::ranges::any_of(stream.members, waits)) compose(stream);
     return;

@@ -176,6 +176,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
     bool unchosen = false;          // there is more to see
     bool ungranted = false;         // pictures have come since then
     bool pictures_since = false;    // and since slots were chosen
+    bool untold = false;            // errors have changed since the frame that is under way was made
     Microseconds changed_at = 0;    // when one of its members, or one that came, last saw something else
     Microseconds unlit_at = 0;      // when slots were last chosen for less than `lit`
     int reweighed = 0;              // times that they were chosen for nothing but that, since somebody saw more
@@ -202,6 +203,7 @@ class TileSchedulerActor : public runtime::Actor<tile_scheduler::Inbox> {
   void estimate_error(const Stream& stream, Session& session) const;
   [[nodiscard]] static float light_error(const Stream& stream);
   void tell_no_change(const ViewAnswer& answer);
+  void tell_errors(Stream& stream);
   void record_errors();
 
   // Looks.

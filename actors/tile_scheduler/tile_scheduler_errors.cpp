@@ -59,6 +59,17 @@ void TileSchedulerActor::tell_no_change(const ViewAnswer& answer) {
   peers_->sessions->find(answer.session).tell(session::NoChange(full, session ? session->told.error : 1.0f));
 }
 
+// Of a frame that is under way clients would read what was so before.
+void TileSchedulerActor::tell_errors(Stream& stream) {
+  stream.untold = stream.state.in_flight();
+  if (stream.untold) return;
+  for (const auto* member : stream.members) {
+    ViewAnswer none;
+    none.session = member->id;
+    if (member->posed) tell_no_change(none);
+  }
+}
+
 // One observation a view and update: quantiles over views, and the worst of now.
 void TileSchedulerActor::record_errors() {
   double worst = 0;

@@ -51,12 +51,13 @@ TEST_F(TileScheduler, WhoHasNothingYetIsToldAtOnceHowFarTheCoarsePictureIsOff) {
   open(ann_);
   open(SessionId{2});  // has sent no camera: there is no view to tell of
   look(ann_, 1, ahead_);
-  finish_frame(first_);
   const float unlit = heard_.frames[first_].back().errors.at(0).error;
   const auto told_before = heard_.no_changes.size();
   auto coarse = std::make_shared<CoarseLuma>();
   scheduler_.tell(CoarsePictured(coarse));
   system_.run_until_idle();
+  EXPECT_EQ(heard_.no_changes.size(), told_before) << "the frame under way would be read after it";
+  finish_frame(first_);
   ASSERT_EQ(heard_.no_changes.size(), told_before + 1);
   const auto& told = heard_.no_changes.back();
   EXPECT_EQ(told.answer.session, ann_);
