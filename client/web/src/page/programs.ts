@@ -19,7 +19,7 @@ export interface SurfaceVariant {
   linear: boolean;
   /** Writes the class of each sample instead of its colour. */
   stats: boolean;
-  /** Nothing but CoarseTex is there: a third of the program, and ready the sooner. */
+  /** Nothing but CoarseTex is there: without the walk down the levels a program is ready the sooner. */
   coarse: boolean;
   /** Adds the private layer. */
   view: boolean;

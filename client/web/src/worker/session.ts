@@ -56,7 +56,7 @@ export class Session implements SocketOwner {
   constructor(url: string, private readonly name: string, private readonly chroma444: boolean, pose: Pose | null,
               private readonly post: Post, ready: Promise<void> = Promise.resolve()) {
     this.pose = pose;
-    this.work = ready;
+    this.work = ready.catch((error: unknown) => this.stop(error));
     this.socket = new StreamSocket(url, this);
     this.socket.open();
     self.setInterval(() => this.tellTraffic(), kTrafficEveryMs);
