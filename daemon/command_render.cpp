@@ -51,7 +51,9 @@ class KeptSums {
     const std::string done =
         std::to_string(picture.spp) + " samples per pixel, own PSNR " + decibel_words(picture.own_psnr) + ", ";
     if (file_.empty() || written() == before_) return "interrupted; " + done + "could not be kept";
-    return "interrupted; " + done + "are kept in " + file_.string() + "; the same command goes on from there";
+    return "interrupted; " + done + "are kept in " + file_.string() +
+           "; the same command goes on from there, and with --spp " + std::to_string(picture.spp) +
+           " it writes this picture";
   }
 
  private:

@@ -1,10 +1,13 @@
 #include "daemon/world.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
 #include <future>
+#include <map>
+#include <string>
 #include <system_error>
 #include <thread>
 
@@ -34,6 +37,21 @@ atlas::LayoutOptions layout_options(const config::Config& config, unsigned threa
     spdlog::info("atlas: {} {} %", stage, now * 10);
   };
   return options;
+}
+
+// What is missing in the picture should be looked for in the file, not in the renderer.
+void warn_of_dropped(const scene::Scene& scene, const atlas::Layout& layout) {
+  std::map<std::string, std::uint64_t> reasons;
+  for (const auto& d : scene.dropped) reasons[d.reason] += d.triangles;
+  for (const auto& d : layout.dropped) reasons[d.reason] += d.count;
+  std::uint64_t total = 0;
+  std::string words;
+  for (const auto& [reason, count] : reasons) {
+    if (count == 0) continue;
+    total += count;
+    words += fmt::format("{}{} {}", words.empty() ? "" : ", ", count, reason);
+  }
+  if (total > 0) spdlog::warn("{}: {} triangles are left out ({})", scene.path, total, words);
 }
 
 Result<void> make_state_dir(const std::filesystem::path& dir) {
@@ -79,6 +97,7 @@ Result<World> load_world(const config::Config& config, unsigned threads) {
   if (!rays) return std::unexpected(rays.error());
   world.layout = std::move(*layout);
   world.rays = std::move(*rays);
+  warn_of_dropped(*world.scene, *world.layout);
   const auto& finest = world.layout->levels.front();
   spdlog::info("atlas: {} patches, q {}, {} levels, {} x {} texels, occupancy {:.2f} ({} in {:.2f} s)",
                world.layout->patch_count, world.layout->q, world.layout->levels.size(), finest.width, finest.height,

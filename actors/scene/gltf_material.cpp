@@ -2,9 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <string>
 
 namespace darm::scene::gltf {
 namespace {
+
+constexpr double kMaxEmissiveStrength = 1e12;  // sums and squares of such light stay finite
+constexpr std::size_t kMostNamed = 8;          // in warnings
 
 float finite_clamped(double value, double low, double high, double fallback) {
   return static_cast<float>(std::isfinite(value) ? std::clamp(value, low, high) : fallback);
@@ -127,9 +132,33 @@ Result<void> read_core(TextureReader& textures, const tinygltf::Material& in, Ma
   return {};
 }
 
+// What a lamp cannot be is said: a dark room has many causes. Null: it can be taken as it is.
+const char* fault_of_strength(double strength) {
+  if (!std::isfinite(strength)) return "an emissiveStrength that is not finite; it is taken as 1";
+  if (strength < 0.0) return "a negative emissiveStrength; it is taken as 0, no light";
+  if (strength > kMaxEmissiveStrength) return "an emissiveStrength over 1e12; it is taken as 1e12";
+  return nullptr;
+}
+
+double emissive_strength(const tinygltf::Material& in) {
+  const auto* e = find_extension(in.extensions, "KHR_materials_emissive_strength");
+  return e ? number_or(*e, "emissiveStrength", 1.0) : 1.0;
+}
+
+void warn_of_strengths(Document& document) {
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < document.model.materials.size(); ++i) {
+    const tinygltf::Material& in = document.model.materials[i];
+    const char* fault = fault_of_strength(emissive_strength(in));
+    if (fault == nullptr || ++found > kMostNamed) continue;
+    document.warnings.push_back(named("material", i, in.name) + " has " + fault);
+  }
+  if (found > kMostNamed)
+    document.warnings.push_back(std::to_string(found - kMostNamed) + " more materials have such strengths");
+}
+
 Result<void> read_extensions(TextureReader& textures, const tinygltf::Material& in, Material& out) {
-  if (const auto* e = find_extension(in.extensions, "KHR_materials_emissive_strength"))
-    out.emissive *= finite_clamped(number_or(*e, "emissiveStrength", 1.0), 0.0, 1e12, 1.0);
+  out.emissive *= finite_clamped(emissive_strength(in), 0.0, kMaxEmissiveStrength, 1.0);
   if (const auto* e = find_extension(in.extensions, "KHR_materials_ior")) {
     const double ior = number_or(*e, "ior", 1.5);
     // 0 is glTF's way to say "reflect everything"; otherwise light cannot be faster than in vacuum.
@@ -166,6 +195,7 @@ Result<std::vector<Material>> read_materials(Document& document) {
     if (!ok) return fail(named("material", i, in.name) + " " + ok.error().message);
     materials.push_back(std::move(out));
   }
+  warn_of_strengths(document);
   Material fallback;
   fallback.name = "default";
   materials.push_back(std::move(fallback));

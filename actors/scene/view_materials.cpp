@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <tuple>
 
 namespace darm::scene {
 namespace {
@@ -25,37 +26,87 @@ glm::vec4 texel(const Scene& scene, const TextureRef& texture, std::uint32_t x, 
   return glm::vec4(p[0], p[1], p[2], p[3]) * (1.0f / 255.0f);
 }
 
+// What reaches an eye by a reflection, and through what scatters, as a share of what lights the picture: see
+// ARCHITECTURE, decision 50.
+constexpr float kByMetal = 0.7f;
+constexpr float kByCoat = 0.7f;
+constexpr float kThrough = 0.3f;
+
+using Omitted = decltype(ViewMaterial::omitted);
+
 struct Point {
   float weight = 0;
-  float omitted = 0;
+  Omitted omitted{};
   float diffuse = 0;
   float call = 0;
   float roughness = 1;
 };
 
-Point point_of(const Scene& scene, const Material& m, std::uint32_t x, std::uint32_t y) {
+// One point of a material, luminance; shares of the light that arrives.
+struct Shares {
+  float roughness = 1;
+  float metal = 0;    // reflected by metal
+  float coated = 1;   // of the surface that is no metal
+  float f0 = 0;       // of the coat, straight on
+  float diffuse = 0;  // what the shared light has
+  float passed = 0;   // straight through what is thin: drawn by the client
+  float through = 0;  // through what scatters or refracts
+};
+
+float fresnel_average(float f0) { return f0 > 0 ? f0 + (1.0f - f0) / 21.0f : 0.0f; }
+
+Shares shares_of(const Scene& scene, const Material& m, std::uint32_t x, std::uint32_t y) {
   const glm::vec4 shine = texel(scene, m.metallic_roughness_texture, x, y);
   const glm::vec4 tint = texel(scene, m.base_color_texture, x, y);
-  const float roughness = m.roughness * shine.y;
-  const float metallic = m.metallic * shine.z;
   const float transmission = m.transmission * texel(scene, m.transmission_texture, x, y).x;
   const auto channel = [&](float factor, float code) { return factor * code * code; };
   const float base = 0.2126f * channel(m.base_color.x, tint.x) + 0.7152f * channel(m.base_color.y, tint.y) +
                      0.0722f * channel(m.base_color.z, tint.z);
   const float ratio = (m.ior - 1.0f) / (m.ior + 1.0f);
-  const float f0 = ratio * ratio;
-  const float fresnel = f0 > 0 ? f0 + (1.0f - f0) / 21.0f : 0.0f;  // its view average
-  const float dielectric = 1.0f - metallic;
-  const float diffuse = base * dielectric * (1.0f - transmission) * (1.0f - fresnel);
-  const bool scatters = m.thickness > 0 || roughness * roughness > 1e-3f;  // else what is behind is drawn by the client
-  const float through = scatters ? base * dielectric * transmission * (1.0f - fresnel) : 0.0f;
-  const float needed = metallic * base + through + (roughness < kRough ? dielectric * fresnel : 0.0f);
-  const float view = metallic * base + dielectric * fresnel + through;
-  const float smooth = std::clamp(1.0f - roughness, 0.0f, 1.0f);
+  const float metallic = m.metallic * shine.z;
+  Shares out;
+  out.roughness = m.roughness * shine.y;
+  out.metal = metallic * base;
+  out.coated = 1.0f - metallic;
+  out.f0 = ratio * ratio;
+  const float enters = base * out.coated * (1.0f - fresnel_average(out.f0));
+  out.diffuse = enters * (1.0f - transmission);
+  const bool thin = m.thickness <= 0;
+  const bool scatters = !thin || out.roughness * out.roughness > 1e-3f;
+  out.passed = thin ? enters * transmission : 0.0f;
+  out.through = scatters ? enters * transmission : 0.0f;
+  return out;
+}
+
+// Added to what reflects `light` of grey surroundings, as a difference of display values.
+float shown(float added, float light) {
+  return srgb(kGreySurroundings * (light + added)) - srgb(kGreySurroundings * light);
+}
+
+float omitted_at(const Shares& p, float cosine) {
+  const float grazing = 1.0f - cosine;
+  const float rise = grazing * grazing * grazing * grazing * grazing;
+  const float coat = p.f0 > 0 ? p.f0 + std::max(1.0f - p.roughness - p.f0, 0.0f) * rise : 0.0f;
+  const float refracted = p.passed > 0 ? 0.0f : p.through;
+  const float left_out =
+      shown(kByMetal * p.metal + kByCoat * p.coated * coat + kThrough * refracted, p.diffuse + p.passed);
+  return left_out * left_out;
+}
+
+Point point_of(const Scene& scene, const Material& m, std::uint32_t x, std::uint32_t y) {
+  const Shares p = shares_of(scene, m, x, y);
+  const float fresnel = p.coated * fresnel_average(p.f0);
+  const float smooth = std::clamp(1.0f - p.roughness, 0.0f, 1.0f);
   const float contrast = 1.0f + 2.0f * smooth * smooth;
-  constexpr float kGrey = kGreySurroundings;
-  const auto shown = [&](float light) { return srgb(kGrey * (diffuse + light)) - srgb(kGrey * diffuse); };
-  return {contrast * shown(view), shown(view), diffuse, contrast * shown(needed), roughness};
+  const float needed = p.metal + p.through + (p.roughness < kRough ? fresnel : 0.0f);
+  Point out{contrast * shown(p.metal + fresnel + p.through, p.diffuse),
+            {},
+            p.diffuse,
+            contrast * shown(needed, p.diffuse),
+            p.roughness};
+  for (std::size_t i = 0; i < out.omitted.size(); ++i)
+    out.omitted[i] = omitted_at(p, (static_cast<float>(i) + 0.5f) / static_cast<float>(out.omitted.size()));
+  return out;
 }
 
 // A lobe of roughness r is about r^2 radians wide, and what it reflects changes over about so many pixels.
@@ -76,19 +127,20 @@ ViewMaterial view_material(const Scene& scene, const Material& m) {
   std::vector<float> roughness;
   double squares = 0;
   double calls = 0;
-  double omitted = 0;
+  std::array<double, std::tuple_size_v<Omitted>> omitted{};
   double diffuse = 0;
   for (std::uint32_t y = 0; y < grid; ++y)
     for (std::uint32_t x = 0; x < grid; ++x) {
       const Point p = point_of(scene, m, x, y);
       squares += double{p.weight} * p.weight;
       calls += double{p.call} * p.call;
-      omitted += double{p.omitted} * p.omitted;
+      for (std::size_t i = 0; i < omitted.size(); ++i) omitted[i] += double{p.omitted[i]};
       diffuse += double{p.diffuse};
       roughness.push_back(p.roughness);
     }
   const auto points = static_cast<double>(roughness.size());
-  out.omitted = std::min(1.0f, static_cast<float>(std::sqrt(omitted / points)));
+  for (std::size_t i = 0; i < omitted.size(); ++i)
+    out.omitted[i] = static_cast<float>(std::min(1.0, omitted[i] / points));
   out.weight = std::min(1.0f, static_cast<float>(std::sqrt(squares / points)));
   out.diffuse = static_cast<float>(diffuse / points);
   out.call = std::min(1.0f, static_cast<float>(std::sqrt(calls / points)));
@@ -127,7 +179,7 @@ std::vector<ViewMaterial> view_materials(const Scene& scene, const ViewMaterialO
   }
   const float least = most >= options.calls ? options.joins : 2.0f;
   for (auto& m : out)
-    if (m.weight < least) m = {.omitted = m.omitted, .diffuse = m.diffuse};
+    if (m.weight < least) m = {.diffuse = m.diffuse, .omitted = m.omitted};
   return out;
 }
 

@@ -1,6 +1,9 @@
 // How much of what each instance shows depends on the eye: what the private layer of a session is worth there.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -16,9 +19,16 @@ struct ViewMaterial {
   float call = 0;
   /// Levels under the sharp one at which its light is kept: what a rough lobe reflects is smooth.
   std::uint8_t coarser = 0;
-  /// Of leaving it out of a picture among kGreySurroundings, whether or not there is a private layer.
-  float omitted = 0;
   float diffuse = 0;  ///< mean luminance of its diffuse albedo, 0..1
+  /// Squared display error of leaving it out of a picture among kGreySurroundings, whether or not there is a private
+  /// layer, by the cosine between eye and normal: equal parts of 0..1.
+  std::array<float, 8> omitted{};
+
+  /// `cosine`: 0..1.
+  [[nodiscard]] float squared_omitted(float cosine) const {
+    const auto part = static_cast<int>(cosine * static_cast<float>(omitted.size()));
+    return omitted[static_cast<std::size_t>(std::clamp(part, 0, static_cast<int>(omitted.size()) - 1))];
+  }
 };
 
 struct ViewMaterialOptions {
@@ -28,7 +38,9 @@ struct ViewMaterialOptions {
 
 /// Reads a material and a grid of points of its textures. The weight of a point: what a grey surrounding of display
 /// value about .6 (kGreySurroundings) would add to its diffuse light, as a difference of display values, times 1 to 3
-/// for lobes so narrow that they show what they reflect. Of the material: RMS over the points.
+/// for lobes so narrow that they show what they reflect. Of the material: RMS over the points. What `omitted` counts is
+/// seen at an angle (Schlick's Fresnel; rough coats stay under it), and from surroundings as they are: less light than
+/// where the camera looks, which is at what is lit.
 [[nodiscard]] ViewMaterial view_material(const Scene& scene, const Material& material);
 
 /// What a thin clear surface passes of what is straight behind it, as a mean over a grid of points of its textures:

@@ -53,7 +53,7 @@ void PrivateSet::add(const atlas::Layout& layout, const SurfaceSample& sample, c
     const glm::vec2 corner = glm::vec2(tile.index() % level.tiles_x, tile.index() / level.tiles_x) * float{kTileSize};
     mark(*mask, texel - corner + 1.0f, glm::min(reach, glm::vec2(kMostReach)));
   }
-  count(chain, material.weight, material.omitted * material.omitted, 1.0f);
+  count(chain, material.weight, material.squared_omitted(sample.cosine), 1.0f);
 }
 
 void PrivateSet::count(const Chain& chain, float worth, float square, float samples) {

@@ -82,6 +82,8 @@ bool ViewSampler::surface_of(const renderer::trace::Hit& hit, const glm::vec3& d
     const auto& c = chart.uv[hit.triangle];
     return (c[1] - c[0]) * a + (c[2] - c[0]) * b;
   };
+  const float lengths = std::sqrt(nn) * glm::length(direction);
+  out.cosine = lengths > 0 ? std::min(std::abs(facing) / lengths, 1.0f) : 1.0f;
   if (std::abs(facing) > 1e-30f && nn > 0) {
     out.uv_dx = gradient(right_);
     out.uv_dy = gradient(down_);

@@ -22,6 +22,7 @@ struct SurfaceSample {
   PatchId patch = kNoPatch;
   std::uint32_t instance = 0;
   int level = 0;           ///< sharp level
+  float cosine = 1;        ///< between the triangle's normal and the eye, 0..1
   float pixel_texels = 0;  ///< minor axis of a pixel's footprint, texels of level 0: under 1, a pixel wants finer ones
   glm::vec2 uv{0.0f};      ///< position in the patch, world units
   glm::vec2 patch_size{0.0f};  ///< extent of the patch, world units

@@ -11,9 +11,6 @@ namespace {
 constexpr std::size_t kMostTaps = 4096;
 constexpr float kLeastDiffuse = 0.02f;  // what reflects less says nothing of the light that falls on it
 constexpr double kUsualStep = 0.045;    // RMS difference of neighbours in the plainest of the nine evaluation views
-// What is reflected is darker than what is seen, which is where the lamps shine; and rough lobes hide part of
-// themselves. Left out over expected is 0.41 to 0.61 in the nine evaluation views, 0.50 among spheres of metal.
-constexpr float kReflected = 0.5f;
 
 double linear(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
 
@@ -57,7 +54,7 @@ ViewTone tone_of(const VisibleSet& view, const CoarseLuma* coarse) {
 
 float shown_of_omitted(const ViewTone& tone) {
   // The display curve is nearly a power: a factor in light is one in what is shown, and in its differences.
-  return kReflected * std::pow(tone.surroundings / scene::kGreySurroundings, 1.0f / 2.2f);
+  return std::pow(tone.surroundings / scene::kGreySurroundings, 1.0f / 2.2f);
 }
 
 float omitted_error(const VisibleSet& view, const ViewTone& tone) {

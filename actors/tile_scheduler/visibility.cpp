@@ -165,7 +165,7 @@ void trace_rows(const ViewSampler& sampler, int pass, std::uint32_t first_row, s
         add_sample(sampler.layout(), surfaces[i], early, note_taps, out);
         if (own.materials.empty()) continue;
         const auto& material = own.materials[surfaces[i].instance];
-        out.add_omitted(double{material.omitted} * double{material.omitted}, double{material.diffuse});
+        out.add_omitted(double{material.squared_omitted(surfaces[i].cosine)}, double{material.diffuse});
         if (gather) own.set->add(sampler.layout(), surfaces[i], material, early);
       }
       ++samples;

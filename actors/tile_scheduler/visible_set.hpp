@@ -43,7 +43,7 @@ class VisibleSet {
   void add_taps(const SampleTaps& taps);
   /// Squared display error of a sample for want of finer texels than the atlas has.
   void add_magnified(double squared_error) { magnified_ += squared_error; }
-  /// A sample's ViewMaterial::omitted, squared, and ViewMaterial::diffuse.
+  /// A sample's ViewMaterial::squared_omitted() and ViewMaterial::diffuse.
   void add_omitted(double squared_error, double diffuse) {
     omitted_ += squared_error;
     diffuse_ += diffuse;

@@ -69,6 +69,7 @@ class Render(unittest.TestCase):
         self.assertIn(f"are kept in {file}; the same command goes on from there", said)
         self.assertFalse(self.out.exists())
         spp = re.search(r"(\d+) samples per pixel", said).group(1)
+        self.assertIn(f"with --spp {spp} it writes this picture", said)
         kept = file.read_bytes()
         self.render("--camera", "hall", spp=spp)
         self.assertEqual(file.read_bytes(), kept)  # the time spent too: nothing was traced again

@@ -273,6 +273,32 @@ TEST(GltfLoader, DoesNotNameLightsWithoutEnd) {
   EXPECT_THAT(warnings.back(), HasSubstr("more lights"));
 }
 
+std::vector<std::string> warnings_of_strength(const std::string& strength, std::size_t materials = 1) {
+  SmallScene s;
+  s.primitive += R"(,"material":0)";
+  s.more_members = R"(,"materials":[)";
+  for (std::size_t i = 0; i < materials; ++i)
+    s.more_members +=
+        (i == 0 ? "" : ",") +
+        (R"({"name":"lamp","emissiveFactor":[1,1,1],"extensions":{"KHR_materials_emissive_strength":)" + strength) +
+        "}}";
+  s.more_members += "]";
+  const auto loaded = load(s);
+  EXPECT_TRUE(loaded) << loaded.error().message;
+  return loaded ? (*loaded)->warnings : std::vector<std::string>();
+}
+
+TEST(GltfLoader, NamesAMaterialWhoseEmissionItChanges) {
+  EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":40})"), testing::IsEmpty());
+  EXPECT_THAT(warnings_of_strength("{}"), testing::IsEmpty());
+  EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":-40})"),
+              testing::ElementsAre("material 0 'lamp' has a negative emissiveStrength; it is taken as 0, no light"));
+  EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":1e15})"), testing::ElementsAre(HasSubstr("taken as 1e12")));
+  const auto many = warnings_of_strength(R"({"emissiveStrength":-40})", 100);
+  EXPECT_LT(many.size(), 20u);
+  EXPECT_THAT(many.back(), HasSubstr("more materials"));
+}
+
 TEST(GltfLoader, ReadsOnlyInsideItsFolder) {
   const auto folder = std::filesystem::temp_directory_path() / "darm_scene_sandbox";
   std::filesystem::remove_all(folder);

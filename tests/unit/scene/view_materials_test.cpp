@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 
@@ -45,9 +46,9 @@ TEST(ViewMaterials, a_scene_of_matte_surfaces_has_no_private_layer) {
   const auto weights = view_materials(scene_of({plaster(0.9f), plaster(1.0f), matte, unlit, dark}));
   EXPECT_FALSE(calls_for_view_layer(weights));
   for (const auto& m : weights) EXPECT_EQ(m.weight, 0.0f);
-  EXPECT_GT(weights[0].omitted, 0.02f) << "its sheen is left out, and told";
-  EXPECT_EQ(weights[2].omitted, 0.0f);
-  EXPECT_EQ(weights[3].omitted, 0.0f);
+  EXPECT_GT(weights[0].squared_omitted(0.5f), 0.005f * 0.005f) << "its sheen is left out, and told";
+  EXPECT_EQ(weights[2].squared_omitted(0.5f), 0.0f);
+  EXPECT_EQ(weights[3].squared_omitted(0.5f), 0.0f);
 }
 
 TEST(ViewMaterials, beside_a_mirror_rough_surfaces_join_at_coarse_levels) {
@@ -56,12 +57,34 @@ TEST(ViewMaterials, beside_a_mirror_rough_surfaces_join_at_coarse_levels) {
   const auto weights = view_materials(scene_of({plaster(0.9f), mirror(), matte}));
   ASSERT_TRUE(calls_for_view_layer(weights));
   EXPECT_GT(weights[1].weight, 5 * weights[0].weight);
-  EXPECT_LT(weights[1].omitted, weights[1].weight) << "worth more than it shows in the mean: it is sharp";
+  EXPECT_LT(std::sqrt(weights[1].squared_omitted(0.5f)), weights[1].weight)
+      << "worth more than it shows in the mean: it is sharp";
   EXPECT_NEAR(weights[1].diffuse, 0.0f, 1e-6f) << "metal";
   EXPECT_EQ(weights[1].coarser, 0);
   EXPECT_GT(weights[0].weight, 0.0f);
   EXPECT_EQ(weights[0].coarser, 3);
   EXPECT_EQ(weights[2].weight, 0.0f) << "nothing is reflected without a boundary";
+}
+
+TEST(ViewMaterials, a_smooth_coat_lacks_more_the_flatter_it_is_looked_at) {
+  const auto floor = view_material(scene_of({plaster(0.1f)}), plaster(0.1f));
+  const auto rough = view_material(scene_of({plaster(1)}), plaster(1));
+  for (float c = 0.1f; c < 1; c += 0.1f) EXPECT_LE(floor.squared_omitted(c + 0.1f), floor.squared_omitted(c)) << c;
+  EXPECT_GT(floor.squared_omitted(0.1f), 16 * floor.squared_omitted(0.9f));
+  EXPECT_NEAR(rough.squared_omitted(0.1f), rough.squared_omitted(0.9f), 1e-6f) << "a rough coat hides behind itself";
+  EXPECT_EQ(floor.squared_omitted(-1), floor.squared_omitted(0));
+  EXPECT_EQ(floor.squared_omitted(2), floor.squared_omitted(1));
+}
+
+TEST(ViewMaterials, what_the_client_draws_behind_a_thin_pane_is_not_lacking) {
+  Material pane = plaster(0.3f);
+  pane.base_color = glm::vec4(1);
+  pane.transmission = 1;
+  Material block = pane;
+  block.thickness = 0.1f;
+  const auto lacks = [](const Material& m) { return view_material(scene_of({m}), m).squared_omitted(0.9f); };
+  EXPECT_LT(lacks(pane), 0.01f);
+  EXPECT_GT(lacks(block), 4 * lacks(pane)) << "it refracts";
 }
 
 TEST(ViewMaterials, a_pane_passes_the_mean_of_what_its_textures_let_through) {

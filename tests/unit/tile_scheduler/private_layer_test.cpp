@@ -120,7 +120,7 @@ TEST_F(PrivateLayerTest, sends_what_has_come_and_forgets_the_pose_before_in_time
 
 TEST_F(PrivateLayerTest, the_error_left_is_what_is_missing_then_what_the_pictures_have) {
   auto materials = all_of(0.5f, 0);
-  for (auto& m : materials) m.omitted = 0.3f;
+  for (auto& m : materials) m.omitted.fill(0.09f);
   VisibleSet shared;
   auto layer = layer_of(512);
   EXPECT_EQ(layer.squared_error(1), 0.0);

@@ -90,6 +90,7 @@ TEST(SharpLevel, FollowsTheMinorAxisOnATiltedPlane) {
     ASSERT_EQ(sampler.trace(80.0f, 45.0f, out), 1);
     const double across = pixel_spread(camera, kViewport) / std::sin(a);
     const auto footprint = footprint_of(out[0].uv_dx, out[0].uv_dy);
+    EXPECT_NEAR(out[0].cosine, std::sin(a), 1e-3) << degrees;
     EXPECT_NEAR(footprint.minor, across, 2e-3 * across) << degrees;
     EXPECT_NEAR(footprint.major, across / std::sin(a), 2e-3 * across / std::sin(a)) << degrees;
   }
