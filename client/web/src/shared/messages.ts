@@ -11,7 +11,7 @@ export interface Pose {
 }
 
 export type ToWorker =
-  | {type: 'open'; url: string; name: string; pose: Pose | null}
+  | {type: 'open'; url: string; name: string; chroma444: boolean; pose: Pose | null}
   | {type: 'camera'; pose: Pose; atUs: number}
   | {type: 'shown'; frame: number; drawUs: number}
   | {type: 'key frames'}
