@@ -180,7 +180,8 @@ void add_accuracy(CLI::App& app, AccuracyCommand& command, Common& common, std::
   app.add_option("--cameras,--camera", command.cameras,
                  "\"px,py,pz tx,ty,tz fovy\" or a name, one or more (default: the first of the set-up)")
       ->expected(1, 64);
-  app.add_option("--seconds", command.seconds, "length of a run; the balanced preset and camera frames take two")
+  app.add_option("--seconds", command.seconds,
+                 "length of a run; the balanced preset, samples and camera frames take two")
       ->check(number(0.5, 3600, false))
       ->capture_default_str();
   app.add_option("--only", command.only,

@@ -69,8 +69,12 @@ std::vector<Variant> variants_of(const StudyScope& scope) {
     variants.add(Group::kPresets, preset).config.accuracy = config::preset_of(preset);
   for (const double q : {scope.q / 2, scope.q * 2})
     variants.add(Group::kDensity, "q " + number_text(q)).config.scene.q = q;
-  for (const std::uint32_t samples : {1u, 4u, 16u, 64u})
-    variants.add(Group::kSamples, "up to " + std::to_string(samples)).config.render.max_samples = samples;
+  // A budget shows once it is spent, which takes as long as the balanced run has.
+  for (const std::uint32_t samples : {1u, 2u, 4u, 16u}) {
+    auto& variant = variants.add(Group::kSamples, "up to " + std::to_string(samples));
+    variant.config.render.max_samples = samples;
+    variant.seconds *= 2;
+  }
   variants.add(Group::kIndirect, "traced").config.accuracy.indirect = "traced";
   variants.add(Group::kFilter, "no filter").config.accuracy.filter_samples = 0;
   if (scope.plan.view_layer && scope.config.stream.view_phystex > 0)
