@@ -51,8 +51,10 @@ Around look_around(const FilterWindow& w) {
 struct Taken {
   std::uint32_t patch = 0;
   float texels = 0;  // that have samples: among these it is shared out
+  float left = 0;    // grey of these, once tamed
   std::array<float, 3> irradiance{};
   float grey = 0;
+  float squares = 0;  // of what each texel lost
 };
 
 Taken& of_patch(std::vector<Taken>& all, std::uint32_t patch) {
@@ -61,7 +63,8 @@ Taken& of_patch(std::vector<Taken>& all, std::uint32_t patch) {
 }
 
 // Evenly over the patch's texels in the window: rooms that are lit by a small bright spot have most of their light in
-// rare samples, and would stay a fifth too dark for as long as these are held down.
+// rare samples, and would stay a fifth too dark for as long as these are held down. What is not trusted is lost until
+// there are more samples; w.held_down has it all.
 void share_out(FilterWindow& w, std::vector<Taken>& all) {
   if (all.empty()) return;  // nearly always
   const auto each = [&](const auto& visit) {
@@ -71,14 +74,29 @@ void share_out(FilterWindow& w, std::vector<Taken>& all) {
       if (taken != all.end()) visit(*taken, at);
     }
   };
-  each([](Taken& taken, std::size_t) { ++taken.texels; });
+  each([&](Taken& taken, std::size_t at) {
+    ++taken.texels;
+    taken.left += w.grey[at];
+  });
+  for (auto& taken : all) {
+    const float share = share_to_trust(taken.grey, taken.squares, taken.left) / taken.texels;
+    for (auto& channel : taken.irradiance) channel *= share;
+    taken.grey *= share;
+  }
   each([&](const Taken& taken, std::size_t at) {
-    for (std::size_t c = 0; c < 3; ++c) w.irradiance[c][at] += taken.irradiance[c] / taken.texels;
-    w.grey[at] += taken.grey / taken.texels;
+    for (std::size_t c = 0; c < 3; ++c) w.irradiance[c][at] += taken.irradiance[c];
+    w.grey[at] += taken.grey;
   });
 }
 
 }  // namespace
+
+float share_to_trust(float taken, float squares, float left) {
+  if (!(taken > 0)) return 1;
+  const double all = double{taken};  // its square, too, is finite
+  const double sure = std::max(1 - double{squares} / (all * all), 0.0);
+  return static_cast<float>(std::min(1.0, sure + double{left} / all));
+}
 
 float outlier_bound(float count) { return 2.0f + 24.0f / count + count / 64.0f; }
 
@@ -95,7 +113,9 @@ void tame_outliers(FilterWindow& w) {
     const float scale = bound / w.grey[at];  // grey > bound >= 0
     taken += double{w.grey[at]} - double{bound};
     auto& own = of_patch(by_patch, w.patch[at]);
-    own.grey += w.grey[at] - bound;
+    const float lost = w.grey[at] - bound;
+    own.grey += lost;
+    own.squares += lost * lost;
     for (std::size_t c = 0; c < 3; ++c) {
       own.irradiance[c] += w.irradiance[c][at] * (1 - scale);
       w.irradiance[c][at] *= scale;

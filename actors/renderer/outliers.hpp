@@ -14,8 +14,15 @@ inline constexpr float kOutlierSamples = 1024;
 /// nothing is held down; what is held down meanwhile is shared out in the picture, and the store knows nothing of it.
 [[nodiscard]] float outlier_bound(float count);
 
+/// How much of what was taken from a patch's texels in a window is shared out, 0..1. What one texel lost says little of
+/// the others, and in full it would show as a bright square: it may at most double their light. `taken`, `squares`: sum
+/// of what texels lost, and of its squares; `left`: sum of what all of the patch have left. With n texels that lost
+/// alike: 1 - 1 / n, and left / taken.
+[[nodiscard]] float share_to_trust(float taken, float squares, float left);
+
 /// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was.
-/// What was taken goes to all texels of the patch in the window alike: the mean stays.
+/// What was taken goes to all texels of the patch in the window alike, as far as it is to be trusted: where many lost
+/// something the mean stays.
 void tame_outliers(FilterWindow& window);
 
 }  // namespace darm::renderer

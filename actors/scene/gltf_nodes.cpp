@@ -221,9 +221,13 @@ std::optional<NamedCamera> read_camera(Document& document, const PlacedNode& pla
   const tinygltf::Camera& in = document.model.cameras[static_cast<std::size_t>(node.camera)];
   const double fovy = in.perspective.yfov;
   const glm::dvec3 position(placed.to_world[3]);
-  if (in.type != "perspective" || !(fovy > 0.0 && fovy < std::numbers::pi) || !is_finite(position)) {
-    document.warnings.push_back(named("camera", static_cast<std::size_t>(node.camera), in.name) +
-                                " is not a perspective camera and is left out");
+  const char* fault = in.type != "perspective"                   ? "is not a perspective camera"
+                      : !(fovy > 0.0 && fovy < std::numbers::pi) ? "has a yfov outside 0 to pi radians"
+                      : !is_finite(position)                     ? "has no finite place"
+                                                                 : nullptr;
+  if (fault != nullptr) {
+    document.warnings.push_back(named("camera", static_cast<std::size_t>(node.camera), in.name) + " " + fault +
+                                " and is left out");
     return std::nullopt;
   }
   NamedCamera out;

@@ -196,7 +196,7 @@ void TableReader::direction(std::string_view key, glm::dvec3& out) {
   if (vector.x * vector.x + vector.y * vector.y + vector.z * vector.z > 1e-12)
     out = vector;
   else
-    fault_at(*value, key, "a direction must not be zero");
+    fault_at(*value, key, "a direction must be longer than 1e-6");
 }
 
 bool TableReader::table(std::string_view key, const std::function<void(TableReader&)>& read) {

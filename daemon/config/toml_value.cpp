@@ -63,7 +63,7 @@ std::string TomlValue::shown() const {
   if (const auto* b = std::get_if<bool>(&data)) return *b ? "true" : "false";
   if (const auto* i = std::get_if<std::int64_t>(&data)) return fmt::format("{}", *i);
   if (const auto* d = std::get_if<double>(&data)) return fmt::format("{}", *d);
-  if (array() != nullptr) return "a list";
+  if (const auto* list = array()) return fmt::format("a list of {}", list->size());
   if (table() != nullptr) return "a table";
   const auto* s = std::get_if<std::string>(&data);
   if (s == nullptr) return "a date or time";

@@ -187,7 +187,7 @@ TEST(LoadConfig, AllFaultsAreReportedAtOnceWithLineKeyValueAndRange) {
       "slower, veryslow");
   has("dir/a.toml:6: session.max_sesions: unknown key; did you mean max_sessions?");
   has("dir/a.toml:7: session.idle_timeout_s: nan is not a number from 1 to 86400");
-  has("dir/a.toml:10: cameras[0].position: a list is not a list of three numbers from -10000000 to 10000000");
+  has("dir/a.toml:10: cameras[0].position: a list of 2 is not a list of three numbers from -10000000 to 10000000");
   has("dir/a.toml:8: cameras[0].target: is missing");
 }
 

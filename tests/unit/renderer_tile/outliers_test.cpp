@@ -56,6 +56,30 @@ TEST(Outliers, TheMeanOfAPatchStays) {
   }
 }
 
+// The caustic of a tiny lamp: shared out in full, one sample of it makes a bright square.
+TEST(Outliers, OneSampleAtMostDoublesTheLightOfItsPatch) {
+  auto w = even(8, 0.1f);
+  for (auto& channel : w.irradiance) channel[700] = 5000;
+  w.grey[700] = 5000;
+  tame_outliers(w);
+  EXPECT_NEAR(w.grey[100], 0.2f, 2e-3f);
+  EXPECT_NEAR(w.irradiance[2][100], 0.2f, 2e-3f);
+  EXPECT_GT(w.held_down, 3.5f) << "all of it counts as error";
+}
+
+TEST(Outliers, TheMoreTexelsLoseSomethingTheMoreOfItIsShared) {
+  EXPECT_EQ(share_to_trust(0, 0, 1), 1.0f);
+  EXPECT_EQ(share_to_trust(10, 100, 20), 1.0f) << "less than is there";
+  EXPECT_FLOAT_EQ(share_to_trust(1000, 1e6f, 100), 0.1f);
+  float before = 0;
+  for (const float n : {1.0f, 2.0f, 4.0f, 64.0f, 1024.0f}) {
+    const float share = share_to_trust(1000, 1e6f / n, 1);
+    EXPECT_GT(share, before);
+    before = share;
+  }
+  EXPECT_GT(before, 0.99f);
+}
+
 TEST(Outliers, AnEdgeOfLightStays) {
   auto w = even(2, 0.1f);
   for (int y = 0; y < w.size; ++y)

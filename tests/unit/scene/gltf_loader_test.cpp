@@ -299,6 +299,20 @@ TEST(GltfLoader, NamesAMaterialWhoseEmissionItChanges) {
   EXPECT_THAT(many.back(), HasSubstr("more materials"));
 }
 
+TEST(GltfLoader, SaysWhyACameraIsLeftOut) {
+  const auto warnings = [](const std::string& camera) {
+    SmallScene s;
+    s.nodes = R"([{"mesh":0},{"camera":0}])";
+    s.roots = "[0,1]";
+    s.more_members = R"(,"cameras":[)" + camera + "]";
+    return load(s).value()->warnings;
+  };
+  EXPECT_THAT(warnings(R"({"type":"perspective","perspective":{"yfov":9,"znear":0.1}})"),
+              testing::ElementsAre(HasSubstr("yfov outside 0 to pi")));
+  EXPECT_THAT(warnings(R"({"type":"orthographic","orthographic":{"xmag":1,"ymag":1,"zfar":9,"znear":0.1}})"),
+              testing::ElementsAre(HasSubstr("is not a perspective camera")));
+}
+
 TEST(GltfLoader, ReadsOnlyInsideItsFolder) {
   const auto folder = std::filesystem::temp_directory_path() / "darm_scene_sandbox";
   std::filesystem::remove_all(folder);
