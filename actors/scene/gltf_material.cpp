@@ -145,16 +145,26 @@ double emissive_strength(const tinygltf::Material& in) {
   return e ? number_or(*e, "emissiveStrength", 1.0) : 1.0;
 }
 
-void warn_of_strengths(Document& document) {
+bool is_share(double value) { return value >= 0.0 && value <= 1.0; }  // not NaN
+
+const char* fault_of_factors(const tinygltf::Material& in) {
+  const auto& pbr = in.pbrMetallicRoughness;
+  const bool shares = std::ranges::all_of(pbr.baseColorFactor, is_share) &&
+                      std::ranges::all_of(in.emissiveFactor, is_share) && is_share(pbr.metallicFactor) &&
+                      is_share(pbr.roughnessFactor);
+  return shares ? nullptr : "a colour, metallic or roughness factor outside 0 to 1; it is taken as the nearer of these";
+}
+
+void warn_of_materials(Document& document) {
   std::size_t found = 0;
   for (std::size_t i = 0; i < document.model.materials.size(); ++i) {
     const tinygltf::Material& in = document.model.materials[i];
-    const char* fault = fault_of_strength(emissive_strength(in));
-    if (fault == nullptr || ++found > kMostNamed) continue;
-    document.warnings.push_back(named("material", i, in.name) + " has " + fault);
+    for (const char* fault : {fault_of_strength(emissive_strength(in)), fault_of_factors(in)})
+      if (fault != nullptr && ++found <= kMostNamed)
+        document.warnings.push_back(named("material", i, in.name) + " has " + fault);
   }
   if (found > kMostNamed)
-    document.warnings.push_back(std::to_string(found - kMostNamed) + " more materials have such strengths");
+    document.warnings.push_back(std::to_string(found - kMostNamed) + " more such faults of materials");
 }
 
 Result<void> read_extensions(TextureReader& textures, const tinygltf::Material& in, Material& out) {
@@ -195,7 +205,7 @@ Result<std::vector<Material>> read_materials(Document& document) {
     if (!ok) return fail(named("material", i, in.name) + " " + ok.error().message);
     materials.push_back(std::move(out));
   }
-  warn_of_strengths(document);
+  warn_of_materials(document);
   Material fallback;
   fallback.name = "default";
   materials.push_back(std::move(fallback));

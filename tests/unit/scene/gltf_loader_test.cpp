@@ -296,7 +296,22 @@ TEST(GltfLoader, NamesAMaterialWhoseEmissionItChanges) {
   EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":1e15})"), testing::ElementsAre(HasSubstr("taken as 1e12")));
   const auto many = warnings_of_strength(R"({"emissiveStrength":-40})", 100);
   EXPECT_LT(many.size(), 20u);
-  EXPECT_THAT(many.back(), HasSubstr("more materials"));
+  EXPECT_THAT(many.back(), HasSubstr("92 more such faults of materials"));
+}
+
+TEST(GltfLoader, NamesAMaterialWhoseFactorsItClamps) {
+  const auto warnings = [](const std::string& members) {
+    SmallScene s;
+    s.primitive += R"(,"material":0)";
+    s.more_members = R"(,"materials":[{"name":"odd",)" + members + "}]";
+    return load(s).value()->warnings;
+  };
+  EXPECT_THAT(warnings(R"("pbrMetallicRoughness":{"roughnessFactor":1,"metallicFactor":0})"), testing::IsEmpty());
+  for (const char* factor : {R"("roughnessFactor":-3)", R"("metallicFactor":2)", R"("baseColorFactor":[1,1,-1,1])"})
+    EXPECT_THAT(warnings(std::string(R"("pbrMetallicRoughness":{)") + factor + "}"),
+                testing::ElementsAre(HasSubstr("material 0 'odd' has a colour, metallic or roughness factor outside")))
+        << factor;
+  EXPECT_THAT(warnings(R"("emissiveFactor":[30,0,0])"), testing::ElementsAre(HasSubstr("outside 0 to 1")));
 }
 
 TEST(GltfLoader, SaysWhyACameraIsLeftOut) {
