@@ -54,7 +54,8 @@ struct Taken {
   float left = 0;    // grey of these, once tamed
   std::array<float, 3> irradiance{};
   float grey = 0;
-  float squares = 0;  // of what each texel lost
+  double lost = 0;  // `grey`, and what each texel lost squared: exact for one texel
+  double squares = 0;
 };
 
 Taken& of_patch(std::vector<Taken>& all, std::uint32_t patch) {
@@ -79,7 +80,7 @@ void share_out(FilterWindow& w, std::vector<Taken>& all) {
     taken.left += w.grey[at];
   });
   for (auto& taken : all) {
-    const float share = share_to_trust(taken.grey, taken.squares, taken.left) / taken.texels;
+    const float share = share_to_trust(taken.lost, taken.squares, double{taken.left}) / taken.texels;
     for (auto& channel : taken.irradiance) channel *= share;
     taken.grey *= share;
   }
@@ -91,11 +92,10 @@ void share_out(FilterWindow& w, std::vector<Taken>& all) {
 
 }  // namespace
 
-float share_to_trust(float taken, float squares, float left) {
+float share_to_trust(double taken, double squares, double left) {
   if (!(taken > 0)) return 1;
-  const double all = double{taken};  // its square, too, is finite
-  const double sure = std::max(1 - double{squares} / (all * all), 0.0);
-  return static_cast<float>(std::min(1.0, sure + double{left} / all));
+  const double sure = std::max(1 - squares / (taken * taken), 0.0);
+  return static_cast<float>(std::min(1.0, sure + left / taken));
 }
 
 float outlier_bound(float count) { return 2.0f + 24.0f / count + count / 64.0f; }
@@ -115,7 +115,8 @@ void tame_outliers(FilterWindow& w) {
     auto& own = of_patch(by_patch, w.patch[at]);
     const float lost = w.grey[at] - bound;
     own.grey += lost;
-    own.squares += lost * lost;
+    own.lost += double{lost};
+    own.squares += double{lost} * double{lost};
     for (std::size_t c = 0; c < 3; ++c) {
       own.irradiance[c] += w.irradiance[c][at] * (1 - scale);
       w.irradiance[c][at] *= scale;

@@ -24,10 +24,10 @@ struct ViewMaterial {
   /// layer, by the cosine between eye and normal: equal parts of 0..1.
   std::array<float, 8> omitted{};
 
-  /// `cosine`: 0..1.
+  /// `cosine`: anything under 0 and NaN are 0, over 1 is 1.
   [[nodiscard]] float squared_omitted(float cosine) const {
-    const auto part = static_cast<int>(cosine * static_cast<float>(omitted.size()));
-    return omitted[static_cast<std::size_t>(std::clamp(part, 0, static_cast<int>(omitted.size()) - 1))];
+    const float part = cosine > 0 ? std::min(cosine, 1.0f) * static_cast<float>(omitted.size()) : 0.0f;
+    return omitted[std::min(static_cast<std::size_t>(part), omitted.size() - 1)];
   }
 };
 

@@ -83,7 +83,8 @@ bool ViewSampler::surface_of(const renderer::trace::Hit& hit, const glm::vec3& d
     return (c[1] - c[0]) * a + (c[2] - c[0]) * b;
   };
   const float lengths = std::sqrt(nn) * glm::length(direction);
-  out.cosine = lengths > 0 ? std::min(std::abs(facing) / lengths, 1.0f) : 1.0f;
+  const float cosine = std::abs(facing) / lengths;
+  out.cosine = cosine < 1 ? cosine : 1.0f;  // 1 also where there is no normal, or one too long for a float
   if (std::abs(facing) > 1e-30f && nn > 0) {
     out.uv_dx = gradient(right_);
     out.uv_dy = gradient(down_);

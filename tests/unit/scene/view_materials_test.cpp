@@ -74,6 +74,7 @@ TEST(ViewMaterials, a_smooth_coat_lacks_more_the_flatter_it_is_looked_at) {
   EXPECT_NEAR(rough.squared_omitted(0.1f), rough.squared_omitted(0.9f), 1e-6f) << "a rough coat hides behind itself";
   EXPECT_EQ(floor.squared_omitted(-1), floor.squared_omitted(0));
   EXPECT_EQ(floor.squared_omitted(2), floor.squared_omitted(1));
+  EXPECT_EQ(floor.squared_omitted(NAN), floor.squared_omitted(0));
 }
 
 TEST(ViewMaterials, what_the_client_draws_behind_a_thin_pane_is_not_lacking) {
