@@ -83,13 +83,11 @@ void describe_atlas(const Inspected& in, json& report) {
     report["levels"].push_back(
         {{"density", level.density}, {"width", level.width}, {"height", level.height}, {"occupancy", level.occupancy}});
   }
-  json dropped = {{"total", atlas.dropped_triangles}, {"reasons", json::array()}};
-  for (const auto& entry : in.scene->dropped) {
-    dropped["reasons"].push_back({{"reason", entry.reason}, {"count", entry.triangles}});
-    dropped["total"] = dropped["total"].get<std::uint64_t>() + entry.triangles;
-  }
-  for (const auto& entry : atlas.dropped) {
+  json dropped = {{"total", 0}, {"reasons", json::array()}};
+  std::uint64_t total = 0;
+  for (const auto& entry : atlas::dropped_triangles(*in.scene, *in.layout)) {
     dropped["reasons"].push_back({{"reason", entry.reason}, {"count", entry.count}});
+    dropped["total"] = total += entry.count;
   }
   report["dropped_triangles"] = dropped;
   report["seconds"] = {{"load", in.load_seconds}, {"parameterise", in.times.parameterise}, {"pack", in.times.pack}};

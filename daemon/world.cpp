@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <chrono>
 #include <future>
-#include <map>
 #include <string>
 #include <system_error>
 #include <thread>
 
+#include "actors/atlas/atlas_report.hpp"
 #include "actors/atlas/build_layout.hpp"
 #include "actors/renderer/coarse_coverage.hpp"
 #include "actors/renderer/exposure.hpp"
@@ -41,12 +41,9 @@ atlas::LayoutOptions layout_options(const config::Config& config, unsigned threa
 
 // What is missing in the picture should be looked for in the file, not in the renderer.
 void warn_of_dropped(const scene::Scene& scene, const atlas::Layout& layout) {
-  std::map<std::string, std::uint64_t> reasons;
-  for (const auto& d : scene.dropped) reasons[d.reason] += d.triangles;
-  for (const auto& d : layout.dropped) reasons[d.reason] += d.count;
   std::uint64_t total = 0;
   std::string words;
-  for (const auto& [reason, count] : reasons) {
+  for (const auto& [reason, count] : atlas::dropped_triangles(scene, layout)) {
     if (count == 0) continue;
     total += count;
     words += fmt::format("{}{} {}", words.empty() ? "" : ", ", count, reason);

@@ -18,8 +18,13 @@ AtlasReport report_atlas(const Layout& layout) {
   out.surface_area = layout.surface_area;
   out.occupancy = layout.levels.front().occupancy;
   for (const auto& l : layout.levels) out.levels.push_back({l.density, l.width, l.height, l.occupancy});
-  out.dropped = layout.dropped;
-  for (const auto& d : layout.dropped) out.dropped_triangles += d.count;
+  return out;
+}
+
+std::vector<DroppedTriangles> dropped_triangles(const scene::Scene& scene, const Layout& layout) {
+  std::vector<DroppedTriangles> out;
+  for (const auto& d : scene.dropped) out.push_back({d.reason, d.triangles});
+  out.insert(out.end(), layout.dropped.begin(), layout.dropped.end());
   return out;
 }
 

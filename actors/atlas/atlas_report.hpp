@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "actors/atlas/layout.hpp"
+#include "actors/scene/scene.hpp"
 
 namespace darm::atlas {
 
@@ -23,10 +24,10 @@ struct AtlasReport {
   double surface_area = 0;
   float occupancy = 0;  ///< of level 0
   std::vector<LevelReport> levels;
-  std::uint64_t dropped_triangles = 0;
-  std::vector<DroppedTriangles> dropped;
 };
 [[nodiscard]] AtlasReport report_atlas(const Layout& layout);
+/// Triangles that the loader or the layout left out, each with its reason; counts may be 0 (what has no triangles).
+[[nodiscard]] std::vector<DroppedTriangles> dropped_triangles(const scene::Scene& scene, const Layout& layout);
 
 /// One bilinear tap of a client's view.
 struct Tap {

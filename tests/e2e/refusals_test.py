@@ -1,10 +1,13 @@
 """What cannot be right is refused at once, in words that name it: before a scene is loaded or a server called."""
+import base64
+import json
+import struct
 import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
-from running import BIN, SET_UP
+from running import BIN, SET_UP, Daemon
 
 SERVE = ["darmd", "serve"]
 RENDER = ["darmd", "render", "--config", SET_UP, "--camera", "hall", "--out", "x.png"]
@@ -68,6 +71,28 @@ class Refusals(unittest.TestCase):
             (SERVE + ["--config", ""], "--config"),
             (SERVE + ["--http-port", "70000"], "--http-port"),
         ])
+
+
+class LeftOut(unittest.TestCase):
+    """What cannot be shown is named, and the rest is served."""
+
+    def test_serve_names_the_triangles_it_leaves_out(self):
+        with tempfile.TemporaryDirectory() as folder:
+            corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (2, 2, 2), (2, 2, 2), (2, 2, 2)]
+            data = b"".join(struct.pack("<3f", *c) for c in corners)
+            scene = Path(folder) / "two.gltf"
+            scene.write_text(json.dumps({
+                "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 6,
+                               "min": [0, 0, 0], "max": [2, 2, 2]}],
+                "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
+                "buffers": [{"byteLength": len(data),
+                             "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}]}))
+            daemon = Daemon(Path(folder) / "state", "--scene", scene)
+            self.addCleanup(daemon.process.kill)
+            self.assertIn("two.gltf: 1 triangles are left out (1 zero area)", daemon.messages())
+            self.assertEqual(daemon.stop(), 0)
 
 
 if __name__ == "__main__":
