@@ -26,6 +26,9 @@ fi
 packages=client/web/packages.stamp
 left_out=build/release/web_left_out
 if [[ -e $left_out ]]; then cmake --preset release -DDARM_WEB=ON > /dev/null && rm "$left_out"; fi
+if [[ ! -e build/release/$packages ]]; then
+  echo "the web client's packages: asking npm, which takes minutes to give up where its registry cannot be reached"
+fi
 if ninja -C build/release -t query "$packages" &> /dev/null && ! ninja -C build/release "$packages"; then
   echo "quickstart.sh: npm could not get the web client's packages (its own words are above), so darmd's page will only" \
     "say that it is missing; other clients work. Run this again once npm reaches its registry." >&2
