@@ -18,7 +18,6 @@ constexpr double kProjectableCosine = 0.4;
 /// Conformal maps may shrink or grow a triangle's area by this factor, against the whole patch.
 constexpr double kMaxAreaStretch = 2.5;
 
-double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 double flat_area(const FlatTriangle& t) { return 0.5 * cross(t[1] - t[0], t[2] - t[0]); }
 
 struct Surface {

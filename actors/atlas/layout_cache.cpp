@@ -20,13 +20,13 @@
 namespace darm::atlas {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31'59'4c'4d'52'41'44'00ull;  // "\0DARMLY1" read as little endian
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint64_t kLayoutMagic = 0x31'59'4c'4d'52'41'44'00ull;  // "\0DARMLY1" read as little endian
+constexpr std::uint32_t kLayoutVersion = 1;
 constexpr std::uint64_t kMaxFile = std::uint64_t{4} << 30;
 
 struct Header {
-  std::uint64_t magic = kMagic;
-  std::uint32_t version = kVersion;
+  std::uint64_t magic = kLayoutMagic;
+  std::uint32_t version = kLayoutVersion;
   std::uint32_t reserved = 0;
   std::uint64_t payload = 0;
   std::uint64_t checksum = 0;
@@ -234,8 +234,9 @@ Result<std::shared_ptr<const Layout>> decode_layout(std::span<const std::byte> b
   if (bytes.size() < sizeof header) return fail("layout: shorter than its header");
   std::memcpy(&header, bytes.data(), sizeof header);
   const auto payload = bytes.subspan(sizeof header);
-  if (header.magic != kMagic) return fail("layout: not a layout file");
-  if (header.version != kVersion) return fail(fmt::format("layout: version {}, wanted {}", header.version, kVersion));
+  if (header.magic != kLayoutMagic) return fail("layout: not a layout file");
+  if (header.version != kLayoutVersion)
+    return fail(fmt::format("layout: version {}, wanted {}", header.version, kLayoutVersion));
   if (header.payload != payload.size()) return fail("layout: torn, the length is wrong");
   if (header.checksum != XXH3_64bits(payload.data(), payload.size()))
     return fail("layout: torn, the checksum is wrong");

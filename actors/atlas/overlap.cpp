@@ -11,8 +11,6 @@ namespace {
 /// How many triangles one candidate is compared with before it is refused.
 constexpr int kCompareLimit = 4096;
 
-double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
-
 /// True if an edge of `a` (counter-clockwise) has all of `b` on its outer side, up to `slack` (a length).
 bool edge_separates(const FlatTriangle& a, const FlatTriangle& b, double slack) {
   for (std::size_t i = 0; i < 3; ++i) {

@@ -8,6 +8,9 @@
 
 namespace darm::atlas {
 
+/// Twice the signed area that a and b span.
+[[nodiscard]] inline double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
+
 using FlatTriangle = std::array<glm::dvec2, 3>;
 
 /// Neighbours of each triangle over its three edges (kNoNeighbour where there is none), from shared corner indices.

@@ -22,10 +22,10 @@ namespace darm::atlas {
 namespace {
 
 constexpr std::uint64_t kPage = 4096;
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kStoreVersion = 2;
 constexpr std::uint32_t kClean = 0x434c4541;
 constexpr std::uint32_t kBeingWritten = 0x44495254;
-constexpr std::array<char, 8> kMagic{'D', 'A', 'R', 'M', 'R', 'A', 'D', '\n'};
+constexpr std::array<char, 8> kStoreMagic{'D', 'A', 'R', 'M', 'R', 'A', 'D', '\n'};
 constexpr std::uint64_t kMaxTiles = std::uint64_t{1} << 28;
 constexpr std::uint64_t kBlocksPerReserve = 32;  // 1.5 MiB: one system call a second even while everything is new
 constexpr double kBrightest = 1e15;
@@ -47,8 +47,8 @@ static_assert(sizeof(FileHeader) <= kPage);
 FileHeader make_header(const StoreKey& key, std::span<const std::uint32_t> tiles_per_level) {
   FileHeader h;
   std::memset(&h, 0, sizeof h);
-  h.magic = kMagic;
-  h.version = kVersion;
+  h.magic = kStoreMagic;
+  h.version = kStoreVersion;
   h.block_bytes = RadianceStore::kBlockBytes;
   h.scene = key.scene;
   h.layout = key.layout;
@@ -200,9 +200,9 @@ std::string RadianceStore::refusal(const StoreKey& key, std::span<const std::uin
   FileHeader found;
   if (::pread(file_, &found, sizeof found, 0) != static_cast<ssize_t>(sizeof found)) return "too short for a header";
   const FileHeader wanted = make_header(key, tiles_per_level);
-  if (found.magic != kMagic) return "not a radiance store";
-  if (found.version != kVersion)
-    return "store version " + std::to_string(found.version) + ", this program writes " + std::to_string(kVersion);
+  if (found.magic != kStoreMagic) return "not a radiance store";
+  if (found.version != kStoreVersion)
+    return "store version " + std::to_string(found.version) + ", this program writes " + std::to_string(kStoreVersion);
   if (found.check_sum != XXH3_64bits(&found, offsetof(FileHeader, check_sum))) return "header is damaged";
   if (found.byte_order != wanted.byte_order) return "written by a machine of other byte order";
   if (found.scene != key.scene) return "of another scene";

@@ -9,7 +9,6 @@ namespace darm::renderer {
 namespace {
 
 constexpr float kLeastWeight = 0.02f;
-constexpr std::uint32_t kNone = 0xffffffffu;  // texel of no patch
 
 // A 2D Gaussian averages over 4 pi sigma^2 texels.
 float gaussian(float distance, float area) {
@@ -109,7 +108,7 @@ void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<Filtere
       if (!any) continue;
       fits.solve(&w.count[first], fitted);
       for (std::size_t x = 0; x < kLanes; ++x) {
-        if (w.patch[first + x] == kNone || fitted.weight[x] < kLeastFitWeight) continue;
+        if (w.patch[first + x] == kNoTexelPatch || fitted.weight[x] < kLeastFitWeight) continue;
         auto& texel = out[static_cast<std::size_t>(y * kSlotSize + b * kLanes) + x];
         texel = {{fitted.value[0][x], fitted.value[1][x], fitted.value[2][x]}, fitted.noise[x], 1, 0, true};
         if (texel.variance > 0) texel.texels = std::max(1.0f, variance_[first + x] / texel.variance);

@@ -10,7 +10,6 @@
 namespace darm::renderer {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffu;  // texel of no patch
 constexpr float kUnknownVariance = 1e30f;
 constexpr float kPooledSamples = 32;
 // Noise is judged over a wide neighbourhood: where light is rare and bright, most texels have not met it yet and would
@@ -71,7 +70,7 @@ void WindowStatistics::measure(const FilterWindow& w) {
   for (std::size_t i = 0; i < n; ++i) {
     weight += double{w.count[i]};
     total += double{w.count[i]} * double{w.grey[i]};
-    texels += w.patch[i] != kNone ? 1.0 : 0.0;
+    texels += w.patch[i] != kNoTexelPatch ? 1.0 : 0.0;
   }
   pivot_ = weight > 0 ? static_cast<float>(total / weight) : 0.0f;
   unit_ = std::max(pivot_, kLeastUnit);
@@ -79,7 +78,7 @@ void WindowStatistics::measure(const FilterWindow& w) {
   for (auto* plane : {&own_.samples, &own_.sum, &own_.squares, &own_.within, &own_.freedom}) plane->resize(n);
   const float scale = 1 / unit_;
   for (std::size_t i = 0; i < n; ++i) {
-    const float count = w.patch[i] != kNone ? w.count[i] : 0.0f;
+    const float count = w.patch[i] != kNoTexelPatch ? w.count[i] : 0.0f;
     const float difference = count > 0 ? (w.grey[i] - pivot_) * scale : 0.0f;
     own_.samples[i] = count;
     own_.sum[i] = count * difference;
@@ -152,7 +151,8 @@ void WindowStatistics::ring(const FilterWindow& w) {
       }
     }
   }
-  for (std::size_t i = 0; i < n; ++i) rings_[i] = w.patch[i] == kNone ? kNone : w.patch[i] * kRings + depth_[i];
+  for (std::size_t i = 0; i < n; ++i)
+    rings_[i] = w.patch[i] == kNoTexelPatch ? kNoTexelPatch : w.patch[i] * kRings + depth_[i];
 }
 
 void WindowStatistics::compare_neighbours(const FilterWindow& w) {
@@ -216,7 +216,7 @@ void WindowStatistics::widen(const FilterWindow& w, float target) {
   noise_.assign(n, 0.0f);
   tinted_.assign(n, 0.0f);
   for (std::size_t i = 0; i < n; ++i) {
-    if (w.patch[i] == kNone || !(w.tint[i] > 0)) continue;
+    if (w.patch[i] == kNoTexelPatch || !(w.tint[i] > 0)) continue;
     const float slope = slope_at(w.floor[i] + w.tint[i] * mean_[i]) * w.tint[i];
     tinted_[i] = 1;
     noise_[i] = slope * slope * spread_[i];
@@ -237,7 +237,7 @@ void WindowStatistics::widen(const FilterWindow& w, float target) {
 void WindowStatistics::run(const FilterWindow& w, float target) {
   const auto n = w.count.size();
   measure(w);
-  by_patch_.connect(w.patch, w.size, kNone);
+  by_patch_.connect(w.patch, w.size, kNoTexelPatch);
   area_class_.assign(n, 0);
   widest_class_ = 0;
   evenness_ = 1;
@@ -258,7 +258,7 @@ void WindowStatistics::run(const FilterWindow& w, float target) {
   }
   compare_neighbours(w);
   ring(w);
-  by_ring_.connect(rings_, w.size, kNone);
+  by_ring_.connect(rings_, w.size, kNoTexelPatch);
   sum_around(by_ring_, pool_radius(texel_samples_), true);
   compare_by(w, false);
   widen(w, target);

@@ -16,8 +16,11 @@ inline constexpr int kMaxFilterRadius = 10;
 /// Mean samples a texel, of those that have any, under which a window is that of a first pass.
 inline constexpr float kFirstPassSamples = 2;
 
+/// FilterWindow::patch of a texel that no patch owns.
+inline constexpr std::uint32_t kNoTexelPatch = 0xffffffffu;
+
 /// A square window of texels with a margin of `radius` around the 32x32 that are filtered. Row-major, one value a
-/// texel. Texels with count 0 give nothing, but are given what the others of their patch (0xffffffff: none) have.
+/// texel. Texels with count 0 give nothing, but are given what the others of their patch (kNoTexelPatch: none) have.
 struct FilterWindow {
   int radius = 0;
   int size = 0;  ///< 32 + 2 * radius
@@ -34,7 +37,7 @@ struct FilterWindow {
     radius = std::clamp(new_radius, 0, kMaxFilterRadius);
     size = kSlotSize + 2 * radius;
     const auto n = static_cast<std::size_t>(size * size);
-    patch.assign(n, 0xffffffffu);
+    patch.assign(n, kNoTexelPatch);
     for (auto* plane : {&count, &grey, &grey_m2, &tint, &floor}) plane->assign(n, 0.0f);
     for (auto& plane : irradiance) plane.assign(n, 0.0f);
     held_down = 0;

@@ -13,7 +13,7 @@ constexpr Effects kGlossyUnderLamps{.emitters = true, .glossy = true};
 constexpr Effects kGlossyUnderSky{.suns = true, .lamps = true, .sky = true, .glossy = true};
 constexpr Effects kGlossy{.suns = true, .lamps = true, .emitters = true, .sky = true, .glossy = true};
 
-constexpr std::array<CompiledIntegrator, 6> kIntegrators = {{
+constexpr std::array<CompiledIntegrator, 6> kPlainIntegrators = {{
     {kDiffuseUnderLamps, make_path_integrator<kDiffuseUnderLamps>},
     {kDiffuseUnderSky, make_path_integrator<kDiffuseUnderSky>},
     {kDiffuse, make_path_integrator<kDiffuse>},
@@ -24,6 +24,6 @@ constexpr std::array<CompiledIntegrator, 6> kIntegrators = {{
 
 }  // namespace
 
-std::span<const CompiledIntegrator> plain_integrators() { return kIntegrators; }
+std::span<const CompiledIntegrator> plain_integrators() { return kPlainIntegrators; }
 
 }  // namespace darm::renderer

@@ -23,7 +23,7 @@ constexpr Effects kLayered{.suns = true,
                            .normal_maps = true,
                            .textures = true};
 
-constexpr std::array<CompiledIntegrator, 6> kIntegrators = {{
+constexpr std::array<CompiledIntegrator, 6> kTexturedIntegrators = {{
     {kPaintedUnderLamps, make_path_integrator<kPaintedUnderLamps>},
     {kPainted, make_path_integrator<kPainted>},
     {kTexturedUnderSky, make_path_integrator<kTexturedUnderSky>},
@@ -34,6 +34,6 @@ constexpr std::array<CompiledIntegrator, 6> kIntegrators = {{
 
 }  // namespace
 
-std::span<const CompiledIntegrator> textured_integrators() { return kIntegrators; }
+std::span<const CompiledIntegrator> textured_integrators() { return kTexturedIntegrators; }
 
 }  // namespace darm::renderer

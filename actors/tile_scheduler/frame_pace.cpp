@@ -6,8 +6,8 @@
 namespace darm::tile_scheduler {
 namespace {
 
-constexpr double kLearned = 0.1;     // weight of the newest frame
-constexpr double kMostUs = 200'000;  // a frame that took longer was held up by something else
+constexpr double kFrameLearned = 0.1;  // weight of the newest frame
+constexpr double kMostUs = 200'000;    // a frame that took longer was held up by something else
 
 }  // namespace
 
@@ -17,7 +17,7 @@ FramePace::FramePace(double processors, Microseconds longest)
 
 void FramePace::done(Microseconds busy) {
   if (busy <= 0) return;
-  frame_us_ += kLearned * (std::min(static_cast<double>(busy), kMostUs) - frame_us_);
+  frame_us_ += kFrameLearned * (std::min(static_cast<double>(busy), kMostUs) - frame_us_);
 }
 
 Microseconds FramePace::interval(std::size_t streams, bool moving) const {

@@ -7,7 +7,7 @@
 namespace darm::tile_scheduler {
 namespace {
 
-constexpr double kLearned = 0.1;  // weight of the newest
+constexpr double kWeighingLearned = 0.1;  // weight of the newest
 
 }  // namespace
 
@@ -59,7 +59,7 @@ void TileSchedulerActor::reallocate_view(Session& session) {
   metrics_.observe("darm_view_allocation_seconds", double(now_us() - started) * 1e-6);
   metrics_.observe("darm_view_private_tiles", double(layer.target_size()));
   if (layer.target_size() > 0 || had) send_view_work(session);
-  view_weighing_us_ += kLearned * (double(now_us() - started) - view_weighing_us_);
+  view_weighing_us_ += kWeighingLearned * (double(now_us() - started) - view_weighing_us_);
 }
 
 // Until CoarseTex is there nobody has a picture at all, and the cores are the shared light's.

@@ -6,7 +6,7 @@
 namespace darm::tile_scheduler {
 namespace {
 
-constexpr double kLearned = 0.2;  // weight of the newest trace
+constexpr double kRayLearned = 0.2;  // weight of the newest trace
 constexpr double kLeastRayUs = 0.01, kMostRayUs = 100;
 constexpr double kMostDebtSeconds = 2;  // of the budget: what many moving views took is not paid off for ever
 
@@ -44,7 +44,7 @@ void TraceBudget::end(std::uint64_t rays, Microseconds busy) {
   const double took = static_cast<double>(std::max<Microseconds>(0, busy));
   debt_us_ = std::max(0.0, debt_us_ + took - static_cast<double>(rays) * ray_us_);
   const double each = std::clamp(took / static_cast<double>(rays), kLeastRayUs, kMostRayUs);
-  ray_us_ += kLearned * (each - ray_us_);
+  ray_us_ += kRayLearned * (each - ray_us_);
 }
 
 }  // namespace darm::tile_scheduler

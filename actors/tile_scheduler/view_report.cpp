@@ -13,11 +13,11 @@
 namespace darm::tile_scheduler {
 namespace {
 
-struct Seen {
+struct SeenTile {
   TexelMask texels;
   bool holds_sample = false;
 };
-using SeenTiles = std::unordered_map<TileId, Seen>;
+using SeenTiles = std::unordered_map<TileId, SeenTile>;
 
 void note(const atlas::Layout& layout, const SurfaceSample& sample, SeenTiles& seen) {
   const auto& level = layout.levels[static_cast<std::size_t>(sample.level)];
