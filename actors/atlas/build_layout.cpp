@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <mutex>
 
 #include "actors/atlas/charts.hpp"
@@ -50,10 +52,20 @@ class Packer {
   std::vector<PatchTriangles> triangles_;
 };
 
+/// Exponent of the densest q that is worth a look: 16 suits rooms and halls, and a scene of less than 256 m has as
+/// many texels from end to end as one of 256 m (a needle without area is as long as that in every level).
+int most_exponent(const scene::Scene& scene) {
+  constexpr int kUsual = 16;
+  constexpr int kMost = 40;
+  const double extent = glm::length(glm::dvec3(scene.bounds_max) - glm::dvec3(scene.bounds_min));
+  if (!(extent > 0)) return kUsual;
+  return kUsual + static_cast<int>(std::clamp(8 - std::ceil(std::log2(extent)), 0.0, double{kMost - kUsual}));
+}
+
 /// Largest power of two whose level 0 stays under the bound, by own texels and the packer's usual waste.
-float choose_q(const Packer& packer) {
+float choose_q(const scene::Scene& scene, const Packer& packer) {
   constexpr double kUsualFill = 0.88;
-  for (int exponent = 16; exponent >= -40; --exponent) {
+  for (int exponent = most_exponent(scene); exponent >= -40; --exponent) {
     const float q = std::ldexp(1.0f, exponent);
     if (packer.least_texels(q) > static_cast<double>(kAutoTexels)) continue;
     if (static_cast<double>(packer.own_texels(q)) < kUsualFill * static_cast<double>(kAutoTexels)) return q;
@@ -108,7 +120,7 @@ Result<std::vector<Level>> pack_levels(const scene::Scene& scene, const Packer& 
   };
   std::vector<Level> levels;
   if (options.progress) options.progress("pack", 0);
-  if (options.q == 0) q = choose_q(packer);
+  if (options.q == 0) q = choose_q(scene, packer);
   const auto finest = [&]() -> Result<Level> {
     if (options.q > 0) return finest_level(scene, packer, options, q);
     return packer.pack(q);

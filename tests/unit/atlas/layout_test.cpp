@@ -202,6 +202,15 @@ TEST(Layout, AutomaticQIsAPowerOfTwoUnderItsBound) {
   EXPECT_GT(texels * 5, kAutoTexels);
 }
 
+TEST(Layout, AutomaticQGivesASmallSceneAsManyTexelsAsALargeOne) {
+  const auto texels_of_box = [](float edge) {
+    const auto l = built(scene_of({box({0, 0, 0}, {edge, edge, edge})}), 0);
+    return std::uint64_t{l->levels[0].width} * l->levels[0].height;
+  };
+  const float small = std::ldexp(1.0f, -14);  // 61 micrometres, a power of two: the same texels exactly
+  EXPECT_EQ(texels_of_box(small), texels_of_box(1));
+}
+
 TEST(Layout, ASceneWithoutSurfaceIsAnError) {
   EXPECT_FALSE(build_layout(scene_of({scene::Mesh{}}), {.q = 8}).has_value());
   EXPECT_FALSE(build_layout(scene_of({box({0, 0, 0}, {1, 1, 1})}), {.q = -1}).has_value());
