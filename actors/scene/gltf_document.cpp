@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "actors/scene/gltf_meshopt.hpp"
+#include "actors/scene/gltf_ranges.hpp"
 
 namespace darm::scene::gltf {
 namespace {
@@ -263,6 +264,7 @@ Result<Document> parse_document(GltfFile file, const LoadLimits& limits) {
   if (const auto ok = check_extensions(*root, document.warnings); !ok) return std::unexpected(ok.error());
   if (const auto ok = check_counts(*root, limits); !ok) return std::unexpected(ok.error());
   warn_of_motion(*root, document.warnings);
+  warn_of_ranges(*root, document.warnings);
   if (const auto ok = list_images(*root, document); !ok) return std::unexpected(ok.error());
   if (const auto ok = fetch_buffers(*root, document); !ok) return std::unexpected(ok.error());
   if (const auto ok = parse_model(*root, document.model); !ok) return std::unexpected(ok.error());

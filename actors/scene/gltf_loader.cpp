@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <string>
+#include <unordered_set>
 
 #include "actors/scene/gltf_document.hpp"
 #include "actors/scene/gltf_image.hpp"
@@ -67,6 +69,7 @@ class SceneBuilder {
   };
 
   Result<void> add_node(const gltf::PlacedNode& placed);
+  void add_camera(std::size_t node, NamedCamera camera);
   Result<void> add_mesh(const gltf::PlacedNode& placed, std::uint32_t object);
   Result<const std::vector<BuiltMesh>*> primitives_of(std::size_t mesh);
   void place(const BuiltMesh& built, const glm::dmat4& to_world, std::uint32_t object);
@@ -80,6 +83,7 @@ class SceneBuilder {
   std::vector<std::optional<std::vector<BuiltMesh>>> built_;  ///< by mesh of the file, made when first placed
   std::vector<PendingInstance> pending_;
   std::vector<gltf::PlacedLight> lights_;
+  std::unordered_set<std::string> camera_names_;
   Bounds bounds_;
   std::uint64_t triangles_ = 0;
   std::uint64_t points_and_lines_ = 0;
@@ -167,9 +171,17 @@ Result<void> SceneBuilder::add_mesh(const gltf::PlacedNode& placed, std::uint32_
   return {};
 }
 
+// Cameras are found by name, so a name that is taken hides every later camera of it.
+void SceneBuilder::add_camera(std::size_t node, NamedCamera camera) {
+  if (!camera_names_.insert(camera.name).second)
+    document_.warnings.push_back(gltf::named("node", node, camera.name) +
+                                 " has a camera of a name that another has; the name means the first");
+  scene_->cameras.push_back(std::move(camera));
+}
+
 Result<void> SceneBuilder::add_node(const gltf::PlacedNode& placed) {
   const tinygltf::Node& node = document_.model.nodes[placed.node];
-  if (auto camera = gltf::read_camera(document_, placed)) scene_->cameras.push_back(std::move(*camera));
+  if (auto camera = gltf::read_camera(document_, placed)) add_camera(placed.node, std::move(*camera));
   auto light = gltf::read_light(document_, placed);
   if (!light) return std::unexpected(light.error());
   if (node.mesh < 0 && !*light) return {};

@@ -9,7 +9,6 @@ namespace darm::scene::gltf {
 namespace {
 
 constexpr double kMaxEmissiveStrength = 1e12;  // sums and squares of such light stay finite
-constexpr std::size_t kMostNamed = 8;          // in warnings
 
 float finite_clamped(double value, double low, double high, double fallback) {
   return static_cast<float>(std::isfinite(value) ? std::clamp(value, low, high) : fallback);
@@ -132,39 +131,9 @@ Result<void> read_core(TextureReader& textures, const tinygltf::Material& in, Ma
   return {};
 }
 
-// What a lamp cannot be is said: a dark room has many causes. Null: it can be taken as it is.
-const char* fault_of_strength(double strength) {
-  if (!std::isfinite(strength)) return "an emissiveStrength that is not finite; it is taken as 1";
-  if (strength < 0.0) return "a negative emissiveStrength; it is taken as 0, no light";
-  if (strength > kMaxEmissiveStrength) return "an emissiveStrength over 1e12; it is taken as 1e12";
-  return nullptr;
-}
-
 double emissive_strength(const tinygltf::Material& in) {
   const auto* e = find_extension(in.extensions, "KHR_materials_emissive_strength");
   return e ? number_or(*e, "emissiveStrength", 1.0) : 1.0;
-}
-
-bool is_share(double value) { return value >= 0.0 && value <= 1.0; }  // not NaN
-
-const char* fault_of_factors(const tinygltf::Material& in) {
-  const auto& pbr = in.pbrMetallicRoughness;
-  const bool shares = std::ranges::all_of(pbr.baseColorFactor, is_share) &&
-                      std::ranges::all_of(in.emissiveFactor, is_share) && is_share(pbr.metallicFactor) &&
-                      is_share(pbr.roughnessFactor);
-  return shares ? nullptr : "a colour, metallic or roughness factor outside 0 to 1; it is taken as the nearer of these";
-}
-
-void warn_of_materials(Document& document) {
-  std::size_t found = 0;
-  for (std::size_t i = 0; i < document.model.materials.size(); ++i) {
-    const tinygltf::Material& in = document.model.materials[i];
-    for (const char* fault : {fault_of_strength(emissive_strength(in)), fault_of_factors(in)})
-      if (fault != nullptr && ++found <= kMostNamed)
-        document.warnings.push_back(named("material", i, in.name) + " has " + fault);
-  }
-  if (found > kMostNamed)
-    document.warnings.push_back(std::to_string(found - kMostNamed) + " more such faults of materials");
 }
 
 Result<void> read_extensions(TextureReader& textures, const tinygltf::Material& in, Material& out) {
@@ -205,7 +174,6 @@ Result<std::vector<Material>> read_materials(Document& document) {
     if (!ok) return fail(named("material", i, in.name) + " " + ok.error().message);
     materials.push_back(std::move(out));
   }
-  warn_of_materials(document);
   Material fallback;
   fallback.name = "default";
   materials.push_back(std::move(fallback));

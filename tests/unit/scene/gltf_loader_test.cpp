@@ -291,27 +291,57 @@ std::vector<std::string> warnings_of_strength(const std::string& strength, std::
 TEST(GltfLoader, NamesAMaterialWhoseEmissionItChanges) {
   EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":40})"), testing::IsEmpty());
   EXPECT_THAT(warnings_of_strength("{}"), testing::IsEmpty());
-  EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":-40})"),
-              testing::ElementsAre("material 0 'lamp' has a negative emissiveStrength; it is taken as 0, no light"));
-  EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":1e15})"), testing::ElementsAre(HasSubstr("taken as 1e12")));
+  EXPECT_THAT(
+      warnings_of_strength(R"({"emissiveStrength":-40})"),
+      testing::ElementsAre("material 0 'lamp': emissiveStrength -40 is outside 0 to 1e+12; the nearer of these is "
+                           "taken"));
+  EXPECT_THAT(warnings_of_strength(R"({"emissiveStrength":1e15})"),
+              testing::ElementsAre(HasSubstr("outside 0 to 1e+12")));
   const auto many = warnings_of_strength(R"({"emissiveStrength":-40})", 100);
   EXPECT_LT(many.size(), 20u);
-  EXPECT_THAT(many.back(), HasSubstr("92 more such faults of materials"));
+  EXPECT_THAT(many.back(), HasSubstr("92 more values of materials"));
 }
 
-TEST(GltfLoader, NamesAMaterialWhoseFactorsItClamps) {
+TEST(GltfLoader, NamesAMaterialWhoseNumbersItReadsOtherwise) {
   const auto warnings = [](const std::string& members) {
     SmallScene s;
     s.primitive += R"(,"material":0)";
     s.more_members = R"(,"materials":[{"name":"odd",)" + members + "}]";
     return load(s).value()->warnings;
   };
-  EXPECT_THAT(warnings(R"("pbrMetallicRoughness":{"roughnessFactor":1,"metallicFactor":0})"), testing::IsEmpty());
-  for (const char* factor : {R"("roughnessFactor":-3)", R"("metallicFactor":2)", R"("baseColorFactor":[1,1,-1,1])"})
-    EXPECT_THAT(warnings(std::string(R"("pbrMetallicRoughness":{)") + factor + "}"),
-                testing::ElementsAre(HasSubstr("material 0 'odd' has a colour, metallic or roughness factor outside")))
-        << factor;
-  EXPECT_THAT(warnings(R"("emissiveFactor":[30,0,0])"), testing::ElementsAre(HasSubstr("outside 0 to 1")));
+  const auto pbr = [&](const std::string& member) { return warnings(R"("pbrMetallicRoughness":{)" + member + "}"); };
+  const auto extension = [&](const std::string& name, const std::string& member) {
+    return warnings(R"("extensions":{"KHR_materials_)" + name + R"(":{)" + member + "}}");
+  };
+  EXPECT_THAT(pbr(R"("roughnessFactor":1,"metallicFactor":0,"baseColorFactor":[0,0.5,1,1])"), testing::IsEmpty());
+  EXPECT_THAT(extension("ior", R"("ior":0)"), testing::IsEmpty());
+  EXPECT_THAT(
+      pbr(R"("roughnessFactor":-3)"),
+      testing::ElementsAre("material 0 'odd': roughnessFactor -3 is outside 0 to 1; the nearer of these is taken"));
+  EXPECT_THAT(pbr(R"("baseColorFactor":[1,1,-1,1])"), testing::ElementsAre(HasSubstr("baseColorFactor -1")));
+  EXPECT_THAT(pbr(R"("baseColorFactor":[1,1])"), testing::ElementsAre(HasSubstr("not a list of 4 numbers")));
+  EXPECT_THAT(pbr(R"("baseColorFactor":0.5)"), testing::ElementsAre(HasSubstr("not a list of 4 numbers")));
+  EXPECT_THAT(warnings(R"("emissiveFactor":[30,0,0])"), testing::ElementsAre(HasSubstr("emissiveFactor 30")));
+  EXPECT_THAT(extension("ior", R"("ior":0.5)"), testing::ElementsAre(HasSubstr("ior 0.5 is outside 1 to 100")));
+  EXPECT_THAT(extension("transmission", R"("transmissionFactor":"1")"),
+              testing::ElementsAre(HasSubstr("transmissionFactor is not a number; the default")));
+}
+
+TEST(GltfLoader, NamesALightWhoseNumbersItReadsOtherwise) {
+  EXPECT_THAT(warnings_of_light(R"("range":3)"), testing::IsEmpty());
+  EXPECT_THAT(warnings_of_light(R"("range":-1)"),
+              testing::ElementsAre("light 0 'lamp': range -1 is outside 0 to 1e+12; the nearer of these is taken"));
+  EXPECT_THAT(warnings_of_light(R"("color":"red")"), testing::ElementsAre(HasSubstr("not a list of 3 numbers")));
+}
+
+TEST(GltfLoader, NamesACameraThatAnotherHides) {
+  SmallScene s;
+  s.nodes = R"([{"mesh":0},{"camera":0},{"camera":1}])";
+  s.roots = "[0,1,2]";
+  const std::string camera = R"({"name":"eye","type":"perspective","perspective":{"yfov":1,"znear":0.1}})";
+  s.more_members = R"(,"cameras":[)" + camera + "," + camera + "]";
+  EXPECT_THAT(load(s).value()->warnings,
+              testing::ElementsAre("node 2 'eye' has a camera of a name that another has; the name means the first"));
 }
 
 TEST(GltfLoader, SaysWhyACameraIsLeftOut) {
