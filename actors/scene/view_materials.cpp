@@ -28,9 +28,9 @@ glm::vec4 texel(const Scene& scene, const TextureRef& texture, std::uint32_t x, 
 
 // What reaches an eye by a reflection, and through what scatters, as a share of what lights the picture: see
 // ARCHITECTURE, decision 50.
-constexpr float kByMetal = 0.7f;
-constexpr float kByCoat = 0.7f;
-constexpr float kThrough = 0.3f;
+constexpr float kByMetal = 0.6f;
+constexpr float kThrough = 0.26f;
+constexpr float kUnlike = 0.3f;  // what is reflected varies about its mean: its variance over the mean's square
 
 using Omitted = decltype(ViewMaterial::omitted);
 
@@ -83,14 +83,23 @@ float shown(float added, float light) {
   return srgb(kGreySurroundings * (light + added)) - srgb(kGreySurroundings * light);
 }
 
+// GGX's directional albedo for Schlick's Fresnel, within .03 of the integral for f0 = .04, any roughness and angle.
+float coat_albedo(float f0, float roughness, float rise) {
+  const float smooth = 1.0f - roughness;
+  return f0 > 0 ? f0 * (1.0f - 0.65f * roughness * roughness) + (0.06f + 0.85f * smooth * smooth) * rise : 0.0f;
+}
+
 float omitted_at(const Shares& p, float cosine) {
   const float grazing = 1.0f - cosine;
   const float rise = grazing * grazing * grazing * grazing * grazing;
-  const float coat = p.f0 > 0 ? p.f0 + std::max(1.0f - p.roughness - p.f0, 0.0f) * rise : 0.0f;
   const float refracted = p.passed > 0 ? 0.0f : p.through;
-  const float left_out =
-      shown(kByMetal * p.metal + kByCoat * p.coated * coat + kThrough * refracted, p.diffuse + p.passed);
-  return left_out * left_out;
+  const float light = p.diffuse + p.passed;
+  const float coat = p.coated * coat_albedo(p.f0, p.roughness, rise);
+  const float added = shown(kByMetal * p.metal + coat + kThrough * refracted, light);
+  // A coat lets in what it does not reflect straight back: a rough one darkens what is seen at a grazing angle.
+  const float let_in = p.f0 > 0 ? (1.0f - p.f0) * (1.0f - rise) / (1.0f - fresnel_average(p.f0)) : 1.0f;
+  const float sum = added + shown(p.diffuse * (let_in - 1.0f), light);
+  return sum * sum + kUnlike * added * added;
 }
 
 Point point_of(const Scene& scene, const Material& m, std::uint32_t x, std::uint32_t y) {

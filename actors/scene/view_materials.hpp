@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -22,12 +23,14 @@ struct ViewMaterial {
   float diffuse = 0;  ///< mean luminance of its diffuse albedo, 0..1
   /// Squared display error of leaving it out of a picture among kGreySurroundings, whether or not there is a private
   /// layer, by the cosine between eye and normal: equal parts of 0..1.
-  std::array<float, 8> omitted{};
+  std::array<float, 16> omitted{};
 
   /// `cosine`: anything under 0 and NaN are 0, over 1 is 1.
   [[nodiscard]] float squared_omitted(float cosine) const {
-    const float part = cosine > 0 ? std::min(cosine, 1.0f) * static_cast<float>(omitted.size()) : 0.0f;
-    return omitted[std::min(static_cast<std::size_t>(part), omitted.size() - 1)];
+    const float last = static_cast<float>(omitted.size() - 1);
+    const float at = cosine > 0 ? std::clamp(cosine * static_cast<float>(omitted.size()) - 0.5f, 0.0f, last) : 0.0f;
+    const auto part = std::min(static_cast<std::size_t>(at), omitted.size() - 2);
+    return std::lerp(omitted[part], omitted[part + 1], at - static_cast<float>(part));
   }
 };
 
