@@ -207,7 +207,7 @@ int run(const InspectCommand& command) {
   if (const auto measured = measure_plan(command, *in, report); !measured) return failed(measured.error());
   if (const auto views = describe_views(command, *in, report); !views) return failed(views.error());
   if (command.json) {
-    std::printf("%s\n", report.dump(2).c_str());
+    std::printf("%s\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
     print(report);
   }

@@ -156,7 +156,7 @@ int run(const RenderCommand& command) {
   }
   if (!*made) return lifecycle::kInterrupted;
   const auto& report = **made;
-  const std::string text = report.dump(2);
+  const std::string text = report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
   const auto file = PictureFiles(command.out).with(".json");
   if (!(std::ofstream(file) << text << '\n').flush()) {
     std::fprintf(stderr, "darmd render: %s: cannot be written\n", file.c_str());

@@ -48,11 +48,18 @@ bool nests_too_deep(std::string_view text) {
   return false;
 }
 
+/// At most `most` bytes, without half a character at the end: reports are JSON, which takes whole ones alone.
+std::string shortened(std::string text, std::size_t most) {
+  if (text.size() <= most) return text;
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xc0) == 0x80) --most;
+  text.resize(most);
+  return text;
+}
+
 std::string one_line(std::string text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
   std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
-  if (text.size() > 300) text.resize(300);
-  return text;
+  return shortened(std::move(text), 300);
 }
 
 std::string text_member(const Json& object, const char* key) {
@@ -235,7 +242,7 @@ Result<Bytes> Document::view(int index) const {
 
 std::string named(const char* kind, std::size_t index, const std::string& name) {
   std::string text = std::string(kind) + " " + std::to_string(index);
-  if (!name.empty()) text += " '" + one_line(name.substr(0, 80)) + "'";
+  if (!name.empty()) text += " '" + one_line(shortened(name, 80)) + "'";
   return text;
 }
 

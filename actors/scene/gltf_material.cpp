@@ -149,6 +149,7 @@ Result<void> read_extensions(TextureReader& textures, const tinygltf::Material& 
     if (!texture) return std::unexpected(texture.error());
     out.transmission_texture = *texture;
   }
+  if (out.ior == 0.0f) out.transmission = 0;  // all is reflected: nothing is left to pass
   if (const auto* e = find_extension(in.extensions, "KHR_materials_volume")) {
     out.thickness = finite_clamped(number_or(*e, "thicknessFactor", 0.0), 0.0, 1e6, 0.0);
     out.attenuation_distance = finite_clamped(number_or(*e, "attenuationDistance", 0.0), 0.0, 1e12, 0.0);

@@ -97,7 +97,7 @@ float omitted_at(const Shares& p, float cosine) {
   const float coat = p.coated * coat_albedo(p.f0, p.roughness, rise);
   const float added = shown(kByMetal * p.metal + coat + kThrough * refracted, light);
   // A coat lets in what it does not reflect straight back: a rough one darkens what is seen at a grazing angle.
-  const float let_in = p.f0 > 0 ? (1.0f - p.f0) * (1.0f - rise) / (1.0f - fresnel_average(p.f0)) : 1.0f;
+  const float let_in = p.f0 > 0 ? (1.0f - rise) * (21.0f / 20.0f) : 1.0f;  // 1 - Fresnel over 1 - its average
   const float sum = added + shown(p.diffuse * (let_in - 1.0f), light);
   return sum * sum + kUnlike * added * added;
 }

@@ -128,7 +128,7 @@ std::string report_json(const VisitFigures& f, const Measured& last) {
   j["size"] = {f.width, f.height};
   j["guard_divisor"] = f.coarsest;
   j["device"] = f.device;
-  return j.dump(2);
+  return j.dump(2, ' ', false, decltype(j)::error_handler_t::replace);
 }
 
 }  // namespace darm::client::desktop

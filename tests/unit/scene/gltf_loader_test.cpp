@@ -249,7 +249,7 @@ std::vector<std::string> warnings_of_light(const std::string& members, std::size
   s.nodes = R"([{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":0}}}])";
   s.more_members = R"(,"extensions":{"KHR_lights_punctual":{"lights":[)";
   for (std::size_t i = 0; i < lights; ++i)
-    s.more_members += (i == 0 ? "" : ",") + (R"({"type":"point","name":"lamp",)" + members) + "}";
+    s.more_members.append(i == 0 ? "" : ",").append(R"({"type":"point","name":"lamp",)").append(members).append("}");
   s.more_members += "]}}";
   const auto loaded = load(s);
   EXPECT_TRUE(loaded) << loaded.error().message;
@@ -325,6 +325,18 @@ TEST(GltfLoader, NamesAMaterialWhoseNumbersItReadsOtherwise) {
   EXPECT_THAT(extension("ior", R"("ior":0.5)"), testing::ElementsAre(HasSubstr("ior 0.5 is outside 1 to 100")));
   EXPECT_THAT(extension("transmission", R"("transmissionFactor":"1")"),
               testing::ElementsAre(HasSubstr("transmissionFactor is not a number; the default")));
+}
+
+// 27 characters of three bytes: a report is JSON, which takes no half of one.
+TEST(GltfLoader, CutsLongNamesBetweenCharacters) {
+  std::string name;
+  for (int i = 0; i < 27; ++i) name += "\u5149";
+  SmallScene s;
+  s.primitive += R"(,"material":0)";
+  s.more_members = R"(,"materials":[{"name":")" + name + R"(","emissiveFactor":[9,0,0]}])";
+  const auto warnings = load(s).value()->warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_THAT(warnings[0], HasSubstr("material 0 '" + name.substr(0, 78) + "'"));
 }
 
 TEST(GltfLoader, NamesALightWhoseNumbersItReadsOtherwise) {

@@ -89,6 +89,16 @@ TEST(ViewMaterials, a_rough_coat_darkens_what_is_looked_at_flatly) {
   EXPECT_LT(rough.squared_omitted(0.6f), 0.02f * 0.02f);
 }
 
+TEST(ViewMaterials, a_surface_that_reflects_all_is_no_fault) {
+  Material all = plaster(0.5f);
+  all.ior = 0;  // glTF's way to say so
+  const auto known = view_material(scene_of({all}), all);
+  for (float c = 0.05f; c < 1; c += 0.1f) {
+    EXPECT_GT(known.squared_omitted(c), 0.0f);
+    EXPECT_LT(known.squared_omitted(c), 0.9f) << "not what NaN is clamped to";
+  }
+}
+
 TEST(ViewMaterials, what_the_client_draws_behind_a_thin_pane_is_not_lacking) {
   Material pane = plaster(0.3f);
   pane.base_color = glm::vec4(1);
