@@ -26,11 +26,17 @@ inline constexpr std::size_t kSessionKeyBytes = 32;
 inline constexpr std::size_t kDatagramKeyBytes = 16;
 inline constexpr std::size_t kDatagramTagBytes = 16;
 
-/// Largest tables a client takes memory for.
-inline constexpr std::uint32_t kMaxPatches = 64u * 1024 * 1024;
-inline constexpr std::uint32_t kMaxInstances = 4u * 1024 * 1024;
+/// Largest tables a client takes memory for; a server refuses a scene that would need more. Entries: tiles of all
+/// levels together, and patches times levels.
+inline constexpr std::uint32_t kMaxTableEntries = 2048u * 2048;
+inline constexpr std::uint32_t kMaxInstances = 1u << 20;
+inline constexpr std::uint32_t kMaxGeometryChunks = 1u << 20;
+inline constexpr std::uint32_t kMaxCoarseTexels = 2048u * 2048;
 inline constexpr std::uint32_t kMaxChunkVertices = 256 * 1024;
 inline constexpr std::uint32_t kMaxChunkIndices = 3 * 64 * 1024;
+
+/// Page edits of one frame, for each slot of its PhysTex: a tile that goes and one that comes, and room for more.
+inline constexpr std::uint64_t kMaxPageEditsPerSlot = 4;
 
 /// Private PhysTex: sizes a session may have, pixels a side. Lossless (evaluation) ones may be larger.
 inline constexpr std::uint32_t kSmallestViewPhysTex = 512;

@@ -178,6 +178,26 @@ std::uint64_t tag_of(const GeometryStream& stream) {
   return std::max<std::uint64_t>(tag, 1);
 }
 
+// What no client would take is said here, to the one who can do something about it.
+Result<void> check_tables(const scene::Scene& scene, const atlas::Layout& layout) {
+  const std::uint64_t places = std::uint64_t{layout.patch_count} * layout.levels.size();
+  std::uint64_t tiles = 0;
+  for (const auto& l : layout.levels) tiles += std::uint64_t{l.tiles_x} * l.tiles_y;
+  if (places > proto::kMaxTableEntries)
+    return fail("geometry: " + std::to_string(layout.patch_count) + " patches on " +
+                std::to_string(layout.levels.size()) + " levels are more than the " +
+                std::to_string(proto::kMaxTableEntries) +
+                " places that clients take; a smaller q has fewer levels, a scene of larger connected surfaces fewer "
+                "patches");
+  if (tiles > proto::kMaxTableEntries)
+    return fail("geometry: " + std::to_string(tiles) + " tiles are more than the " +
+                std::to_string(proto::kMaxTableEntries) + " that clients take; a smaller q has fewer");
+  if (scene.instances.size() > proto::kMaxInstances)
+    return fail("geometry: " + std::to_string(scene.instances.size()) + " instances are more than the " +
+                std::to_string(proto::kMaxInstances) + " that clients take; join some of them");
+  return {};
+}
+
 Result<void> check(const scene::Scene& scene, const atlas::Layout& layout, float exposure) {
   if (!(std::isfinite(exposure) && exposure > 0)) return fail("geometry: exposure must be finite and above 0");
   if (layout.instances.size() != scene.instances.size()) {
@@ -195,7 +215,7 @@ Result<void> check(const scene::Scene& scene, const atlas::Layout& layout, float
   for (const auto& l : layout.levels) {
     if (l.placements.size() != layout.patch_count) return fail("geometry: a level does not place every patch");
   }
-  return {};
+  return check_tables(scene, layout);
 }
 
 }  // namespace

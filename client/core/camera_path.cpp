@@ -96,6 +96,9 @@ struct NamedCamera {
 };
 
 Result<toml::table> read_toml(const std::filesystem::path& setup) {
+  std::error_code code;
+  if (const auto size = std::filesystem::file_size(setup, code); !code && size > kMaxFileBytes)
+    return fail(setup.string() + ": is too large for a set-up");
   try {  // toml++ reports faults of the file by exception
     return toml::parse_file(setup.string());
   } catch (const toml::parse_error& e) {

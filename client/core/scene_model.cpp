@@ -113,7 +113,7 @@ Result<void> SceneModel::read_levels(const wire::SceneManifest& manifest) {
       return fail("manifest: a level is not a whole number of tiles");
     }
     tiles += std::uint64_t{level.tiles_x} * level.tiles_y;
-    if (tiles > kMaxTableEntries) return fail(fmt::format("manifest: over {} tiles", kMaxTableEntries));
+    if (tiles > proto::kMaxTableEntries) return fail(fmt::format("manifest: over {} tiles", proto::kMaxTableEntries));
     levels_.push_back(level);
   }
   tile_count_ = static_cast<std::uint32_t>(tiles);
@@ -123,7 +123,7 @@ Result<void> SceneModel::read_levels(const wire::SceneManifest& manifest) {
 Result<void> SceneModel::read_patches(const wire::SceneManifest& manifest) {
   patch_count_ = manifest.patch_count();
   const std::uint64_t entries = std::uint64_t{patch_count_} * levels_.size();
-  if (patch_count_ == 0 || entries > kMaxTableEntries)
+  if (patch_count_ == 0 || entries > proto::kMaxTableEntries)
     return fail(fmt::format("manifest: {} patches refused", patch_count_));
   const auto packed = unpack_records(manifest.patch_table(), entries, sizeof(PatchPlace));
   if (packed.empty()) return fail("manifest: patch table does not fit the number of patches");
@@ -145,7 +145,8 @@ Result<void> SceneModel::read_coarse_coverage(const wire::SceneManifest& manifes
   const auto& packed = manifest.coarse_coverage();
   if (packed.empty()) return {};
   const std::uint64_t texels = std::uint64_t{levels_.back().width} * levels_.back().height;
-  auto bytes = texels <= proto::most_inflated(packed.size()) ? inflate(packed, texels) : std::nullopt;
+  const auto most = std::min<std::uint64_t>(proto::kMaxCoarseTexels, proto::most_inflated(packed.size()));
+  auto bytes = texels <= most ? inflate(packed, texels) : std::nullopt;
   if (!bytes || bytes->size() != texels) return fail("manifest: coverage of CoarseTex does not fit the last level");
   coarse_coverage_ = std::move(*bytes);
   return {};

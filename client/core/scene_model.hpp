@@ -10,22 +10,23 @@
 
 #include "client/core/result.hpp"
 #include "proto/darm.pb.h"
+#include "proto/limits.hpp"
 
 namespace darm::client {
 
 inline constexpr std::uint32_t kTileSize = 30;      ///< payload of a tile, texels per side
 inline constexpr std::uint32_t kSlotSize = 32;      ///< payload plus a border of one texel
 inline constexpr std::uint32_t kTableWidth = 2048;  ///< width of every table texture
-inline constexpr std::uint32_t kMaxTableEntries = kTableWidth * 2048u;
+static_assert(proto::kMaxTableEntries == kTableWidth * 2048u);
 inline constexpr std::uint32_t kMaxLevels = 16;
 inline constexpr std::uint32_t kNoBase = 0xffffffffu;
 
 /// Bounds on what a server may announce; checked before memory is taken.
 struct SceneLimits {
-  std::uint32_t max_instances = 1u << 20;
-  std::uint32_t max_chunks = 1u << 20;
-  std::uint32_t max_chunk_vertices = 1u << 22;
-  std::uint32_t max_chunk_indices = 1u << 24;
+  std::uint32_t max_instances = proto::kMaxInstances;
+  std::uint32_t max_chunks = proto::kMaxGeometryChunks;
+  std::uint32_t max_chunk_vertices = proto::kMaxChunkVertices;
+  std::uint32_t max_chunk_indices = proto::kMaxChunkIndices;
   std::uint64_t max_geometry_bytes = 8ull << 30;  ///< vertices and indices of all chunks together
 };
 

@@ -51,8 +51,11 @@ Result<StreamPlayer> StreamPlayer::create(const SceneModel& scene, const StreamS
 
 Result<std::vector<StreamPlayer::Edit>> StreamPlayer::read_edits(const wire::StreamFrame& frame,
                                                                  const SceneModel& scene) const {
+  const auto count = static_cast<std::uint64_t>(frame.page_edits_size());
+  if (count > proto::kMaxPageEditsPerSlot * shape_.slot_count())
+    return fail(fmt::format("frame {}: {} page edits", frame.frame(), count));
   std::vector<Edit> edits;
-  edits.reserve(static_cast<std::size_t>(frame.page_edits_size()));
+  edits.reserve(count);
   for (const auto& info : frame.page_edits()) {
     Edit edit{};
     if (!scene.page_entry(info.tile(), edit.entry))

@@ -173,6 +173,10 @@ TEST_F(Player, RefusesWhatContradictsTheManifest) {
       [](auto& f) { f.mutable_page_edits(0)->set_slot(64); },
       [](auto& f) { f.mutable_page_edits(0)->set_slot(70000); },
       [](auto& f) { f.mutable_page_edits(0)->set_coverage("not zlib"); },
+      [](auto& f) {
+        const auto edit = f.page_edits(0);
+        for (int i = 0; i < 4 * 64; ++i) *f.add_page_edits() = edit;  // of 64 slots
+      },
       [](auto& f) { f.add_pixels()->set_rgb("short"); },
       [](auto& f) {
         auto& p = *f.add_pixels();

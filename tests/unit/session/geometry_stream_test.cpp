@@ -277,5 +277,15 @@ TEST(GeometryStream, refuses_a_layout_of_another_scene) {
   EXPECT_FALSE(GeometryStream::build(scene, layout, 1.0f, 1).has_value());
 }
 
+// Otherwise every client would refuse it, and whoever serves it would hear of it from them.
+TEST(GeometryStream, refuses_more_patches_than_clients_take) {
+  auto [scene, layout] = testing::grid(4);
+  layout.patch_count = proto::kMaxTableEntries / static_cast<std::uint32_t>(layout.levels.size()) + 1;
+  for (auto& level : layout.levels) level.placements.resize(layout.patch_count);
+  const auto stream = GeometryStream::build(scene, layout, 1.0f, 1);
+  ASSERT_FALSE(stream.has_value());
+  EXPECT_NE(stream.error().message.find("a smaller q has fewer levels"), std::string::npos) << stream.error().message;
+}
+
 }  // namespace
 }  // namespace darm::session

@@ -9,15 +9,18 @@ export const kSlotSize = 32;
 export const kSlotTexels = kSlotSize * kSlotSize;
 /** Width of every table texture. */
 export const kTableWidth = 2048;
+/** Tiles of all levels together, and patches times levels. */
 export const kMaxTableEntries = kTableWidth * 2048;
+export const kMaxCoarseTexels = 2048 * 2048;
+export const kMaxPageEditsPerSlot = 4;
 export const kMaxLevels = 16;
 export const kAbsent = 65535;
 export const kNoBase = 0xffffffff;
 
 export const kMaxInstances = 1 << 20;
 export const kMaxChunks = 1 << 20;
-export const kMaxChunkVertices = 1 << 22;
-export const kMaxChunkIndices = 1 << 24;
+export const kMaxChunkVertices = 256 * 1024;
+export const kMaxChunkIndices = 3 * 64 * 1024;
 /** Vertices and indices of all chunks together, bytes. */
 export const kMaxGeometryBytes = 2 ** 31;
 export const kVertexBytes = 24;

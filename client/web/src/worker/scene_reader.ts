@@ -2,7 +2,7 @@
 import {MeshoptDecoder} from 'three/examples/jsm/libs/meshopt_decoder.module.js';
 
 import type {GeometryChunk, InstanceInfo, SceneManifest} from '../gen/darm_pb.js';
-import {kMaxChunkIndices, kMaxChunkVertices, kMaxChunks, kMaxGeometryBytes, kMaxInstances, kMaxLevels,
+import {kMaxChunkIndices, kMaxChunkVertices, kMaxChunks, kMaxCoarseTexels, kMaxGeometryBytes, kMaxInstances, kMaxLevels,
   kMaxTableEntries, kNoBase, kPatchEntryBytes, kTileSize, kVertexBytes} from '../shared/limits.js';
 import type {AlphaMode, Background, Chunk, InstanceShape, LevelShape, SceneShape, Vec3} from '../shared/scene.js';
 import {inflate} from './inflate.js';
@@ -146,7 +146,8 @@ function readCoarseCoverage(manifest: SceneManifest, last: LevelShape): Uint8Arr
   const packed = manifest.coarseCoverage;
   if (packed.length === 0) return null;
   const texels = last.width * last.height;
-  const bytes = texels <= mostInflated(packed.length) ? inflate(packed, texels) : null;
+  const most = Math.min(kMaxCoarseTexels, mostInflated(packed.length));
+  const bytes = texels <= most ? inflate(packed, texels) : null;
   check(bytes !== null && bytes.length === texels, 'manifest: coverage of CoarseTex does not fit the last level');
   return bytes;
 }

@@ -1,6 +1,6 @@
 // Keeps picture and page table of one stream in step: both of a frame, or neither (DESIGN section 4, "Frames").
 import type {StreamFrame} from '../gen/darm_pb.js';
-import {kAbsent, kSlotTexels} from '../shared/limits.js';
+import {kAbsent, kMaxPageEditsPerSlot, kSlotTexels} from '../shared/limits.js';
 import type {FrameUpdate, Planes, SceneShape, SlotBytes} from '../shared/scene.js';
 import {slotCount} from '../shared/scene.js';
 import {inflate} from './inflate.js';
@@ -92,6 +92,9 @@ export class StreamPlayer {
   }
 
   private readEdits(frame: StreamFrame, number: number): Edit[] {
+    if (frame.pageEdits.length > kMaxPageEditsPerSlot * this.slots) {
+      throw new Refused(`frame ${number}: ${frame.pageEdits.length} page edits`);
+    }
     return frame.pageEdits.map((info) => {
       const entry = pageEntry(this.scene.levels, info.tile);
       if (entry < 0) throw new Refused(`frame ${number}: no such tile ${info.tile}`);
