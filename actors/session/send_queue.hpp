@@ -89,6 +89,8 @@ class SendQueue {
   [[nodiscard]] bool loading() const { return bulk_waiting_ > 0; }
   /// Of pictures that wait.
   [[nodiscard]] std::size_t media_bytes() const { return tracks_[0].waiting_bytes + tracks_[1].waiting_bytes; }
+  /// Of control messages that wait.
+  [[nodiscard]] std::size_t control_bytes() const { return control_waiting_bytes_; }
   /// Of all that waits, but for what was made for everybody (the scene).
   [[nodiscard]] std::size_t bytes() const { return media_bytes() + control_waiting_bytes_; }
   /// Since it was made, by reason.

@@ -18,6 +18,8 @@ constexpr std::uint32_t kLargestLossless = 8192;
 constexpr double kAnotherRate = 1.25;
 constexpr double kFastEnough = 16e6;
 
+constexpr std::size_t kMostControlForPong = 16 * 1024;  // bytes that wait, some hundred pongs
+
 Packet packet_of(const wire::Envelope& envelope) {
   Packet p;
   p.head = proto::frame(envelope);
@@ -243,7 +245,9 @@ void SessionProtocol::on_feedback(const wire::Feedback& feedback, Actions& actio
   }
 }
 
+// Who pings without reading what comes back is not answered any more: nobody needs so many.
 void SessionProtocol::on_ping(const wire::Ping& ping, Microseconds now) {
+  if (queue_.control_bytes() > kMostControlForPong) return;
   wire::Envelope pong;
   pong.mutable_pong()->set_time_us(ping.time_us());
   pong.mutable_pong()->set_server_time_us(now);
