@@ -10,7 +10,8 @@
 namespace darm::renderer {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31464552'4d524144;  // "DARMREF1"
+constexpr std::uint32_t kMostPasses = 1u << 30;        // of each half
+constexpr std::uint64_t kMagic = 0x32464552'4d524144;  // "DARMREF2"
 
 struct Header {
   std::uint64_t magic = kMagic;
@@ -26,13 +27,22 @@ static_assert(sizeof(QuarterMean) == 16 && sizeof(Header) == 48);
 
 std::uint64_t check_sum(const ReferenceState& state) {
   std::uint64_t h = 0xcbf29ce484222325ull;
+  const auto add = [&h](std::uint64_t word) { h = std::rotl((h ^ word) * 0x9e3779b97f4a7c15ull, 29); };
+  add(state.passes);
+  add(std::bit_cast<std::uint64_t>(state.seconds));
   for (const auto& half : state.halves)
     for (const auto& q : half) {
       std::array<std::uint64_t, 2> words;
       std::memcpy(words.data(), &q, sizeof q);
-      for (const auto w : words) h = std::rotl((h ^ w) * 0x9e3779b97f4a7c15ull, 29);
+      for (const auto w : words) add(w);
     }
   return h;
+}
+
+bool is_sound(const ReferenceState& state) {
+  const auto finite = [](const QuarterMean& q) { return std::isfinite(q.mean.x + q.mean.y + q.mean.z); };
+  return std::isfinite(state.seconds) && state.passes <= kMostPasses &&
+         std::ranges::all_of(state.halves, [&](const auto& half) { return std::ranges::all_of(half, finite); });
 }
 
 glm::vec3 mean_of(const QuarterMean& a, const QuarterMean& b, float weight_a, float weight_b) {
@@ -107,9 +117,9 @@ Result<void> load_state(const std::filesystem::path& path, ReferenceState& state
   const std::size_t bytes = loaded.halves[0].size() * sizeof(QuarterMean);
   if (error || size != sizeof header + 2 * bytes) return refuse("is truncated or has bytes to spare");
   for (auto& half : loaded.halves) file.read(reinterpret_cast<char*>(half.data()), static_cast<std::streamsize>(bytes));
-  if (!file || check_sum(loaded) != header.check_sum || !std::isfinite(header.seconds)) return refuse("is damaged");
   loaded.passes = header.passes;
   loaded.seconds = header.seconds;
+  if (!file || check_sum(loaded) != header.check_sum || !is_sound(loaded)) return refuse("is damaged");
   state = std::move(loaded);
   return {};
 }
