@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "daemon/config/load.hpp"
+#include "proto/limits.hpp"
 
 namespace darm {
 namespace {
@@ -212,7 +213,7 @@ std::string fault_of_command(const CLI::App& app, int argc, char** argv) {
 Command parse_command_line(int argc, char** argv) {
   CLI::App app{"darmd streams ray-traced light of a glTF scene to thin clients"};
   app.require_subcommand(1);
-  app.set_version_flag("--version", "darmd 0.1.0, protocol 1");
+  app.set_version_flag("--version", "darmd 0.1.0, protocol " + std::to_string(proto::kProtocolVersion));
 
   ServeOptions serve;
   auto* serve_app = app.add_subcommand("serve", "run the daemon");

@@ -98,7 +98,7 @@ void read_work(TableReader& root, Config& config) {
   });
   root.table("render", [&](TableReader& reader) {
     reader.integer("threads", config.render.threads, 0, 1024);
-    reader.integer("max_samples", config.render.max_samples, 1, 1 << 24);
+    reader.integer("max_samples", config.render.max_samples, 1, 1 << 22);
     reader.number("slice_ms", config.render.slice_ms, 0.1, 100);
   });
   root.table("accuracy", [&](TableReader& reader) {
