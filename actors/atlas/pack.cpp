@@ -64,7 +64,7 @@ std::vector<PatchPlace> places_of(const scene::Scene& scene, const Charts& chart
   return out;
 }
 
-std::uint64_t bin_of(const glm::dvec3& n) {
+std::uint64_t facing_bin(const glm::dvec3& n) {
   const glm::dvec3 a = glm::abs(n);
   const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
   return static_cast<std::uint64_t>(axis * 2 + (n[axis] < 0 ? 1 : 0));
@@ -252,7 +252,7 @@ PackOrder order_patches(const scene::Scene& scene, const Charts& charts) {
         return static_cast<std::uint64_t>(std::isfinite(f) ? std::clamp(f, 0.0, 1.0) * 1023 : 0);
       };
       const std::uint64_t morton = spread_bits(cell(0)) | spread_bits(cell(1)) << 1 | spread_bits(cell(2)) << 2;
-      const auto bin = bin_of(places[local].normal);
+      const auto bin = facing_bin(places[local].normal);
       // Direction parts the cells of about an eighth of the scene, place the rest.
       const auto key = [&](std::uint64_t b) { return (morton >> 27) << 33 | b << 30 | (morton & 0x7ffffff); };
       keyed.emplace_back(key(bin), use.front_base + local);

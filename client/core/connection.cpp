@@ -32,8 +32,6 @@ using std::chrono::milliseconds;
 
 constexpr std::int64_t kClockPingEveryUs = 1'000'000;
 
-std::string errno_text() { return std::strerror(errno); }
-
 // UDP to the peer of a TCP socket, at another port.
 Descriptor udp_beside(int tcp, std::uint32_t port) {
   sockaddr_storage peer{};
@@ -219,7 +217,7 @@ void Connection::State::read_loop() {
     const bool held = tcp->holds_bytes();
     const int ready = ::poll(fds.data(), fds.size(), held ? 0 : 500);
     if (stopping) break;
-    if (ready < 0 && errno != EINTR) return end(Error("poll: " + errno_text()));
+    if (ready < 0 && errno != EINTR) return end(Error(std::string("poll: ") + std::strerror(errno)));
     if (held || fds[0].revents != 0) {
       if (auto ok = read_some(frames); !ok) return end(ok.error());
       last_heard = now_us();

@@ -25,7 +25,7 @@ bool all_finite(const Range& values) {
   return std::all_of(values.begin(), values.end(), [](auto v) { return std::isfinite(v); });
 }
 
-const unsigned char* bytes_of(const std::string& s) { return reinterpret_cast<const unsigned char*>(s.data()); }
+const unsigned char* packed_bytes(const std::string& s) { return reinterpret_cast<const unsigned char*>(s.data()); }
 
 // The meshopt buffer of `count` records in `packed`; empty: `packed` is damaged, too large or too short for them.
 std::string unpack_records(const std::string& packed, std::uint64_t count, std::uint32_t stride) {
@@ -54,7 +54,7 @@ bool decode_vertices(const wire::GeometryChunk& info, std::vector<Vertex>& out) 
   const auto bytes = unpack_records(info.vertices(), info.vertex_count(), sizeof(GridVertex));
   if (bytes.empty()) return false;
   std::vector<GridVertex> grid(info.vertex_count());
-  if (meshopt_decodeVertexBuffer(grid.data(), grid.size(), sizeof(GridVertex), bytes_of(bytes), bytes.size()) != 0)
+  if (meshopt_decodeVertexBuffer(grid.data(), grid.size(), sizeof(GridVertex), packed_bytes(bytes), bytes.size()) != 0)
     return false;
   out.reserve(grid.size());
   for (const auto& v : grid) out.push_back(off_grid(v, info.position_step(), info.uv_step()));
@@ -69,7 +69,7 @@ bool decode_indices(const wire::GeometryChunk& info, std::vector<std::uint32_t>&
   // The codec spends at least one byte on a triangle.
   if (!bytes || info.index_count() / 3 > bytes->size()) return false;
   out.resize(info.index_count());
-  return meshopt_decodeIndexBuffer(out.data(), out.size(), 4, bytes_of(*bytes), bytes->size()) == 0;
+  return meshopt_decodeIndexBuffer(out.data(), out.size(), 4, packed_bytes(*bytes), bytes->size()) == 0;
 }
 
 }  // namespace
@@ -128,7 +128,8 @@ Result<void> SceneModel::read_patches(const wire::SceneManifest& manifest) {
   const auto packed = unpack_records(manifest.patch_table(), entries, sizeof(PatchPlace));
   if (packed.empty()) return fail("manifest: patch table does not fit the number of patches");
   places_.resize(entries);
-  if (meshopt_decodeVertexBuffer(places_.data(), entries, sizeof(PatchPlace), bytes_of(packed), packed.size()) != 0) {
+  if (meshopt_decodeVertexBuffer(places_.data(), entries, sizeof(PatchPlace), packed_bytes(packed), packed.size()) !=
+      0) {
     return fail("manifest: patch table does not decode");
   }
   for (std::size_t i = 0; i < places_.size(); ++i) {
