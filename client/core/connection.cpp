@@ -367,7 +367,7 @@ void Connection::goodbye() {
 
 Result<void> parse_address(const std::string& text, std::string& host, std::uint16_t& port) {
   const auto colon = text.rfind(':');
-  const auto bad = [&] { return fail("--server " + text + ": expected HOST:PORT"); };
+  const auto bad = [&] { return fail("server " + text + ": expected HOST:PORT"); };
   if (colon == std::string::npos || colon == 0) return bad();
   host = text.substr(0, colon);
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);

@@ -61,6 +61,8 @@ class Viewer {
   void obey(Action action);
   void save_picture();
   Result<void> leave();
+  [[nodiscard]] Result<void> nothing_seen() const;
+  Result<void> report();
   [[nodiscard]] double patience() const;
   [[nodiscard]] bool time_over() const { return plan_.seconds && now_ms() - start_ms_ >= *plan_.seconds * 1000; }
   [[nodiscard]] View view() const { return to_view(rig_.view, size_.width, size_.height); }
@@ -378,15 +380,22 @@ Result<void> Viewer::leave() {
   if (saving_.valid()) saving_.wait();
   if (time_over() && !plan_.screenshot.empty()) {
     if (auto ok = draw(1); !ok) return ok;
-    if (!stage_.whole()) {
-      const Notice notice = stream_->words(now_ms());
-      return fail(fmt::format("no whole picture in {} s: {}", *plan_.seconds,
-                              notice.alert.empty() ? notice.quiet : notice.alert));
-    }
+    if (!stage_.whole()) return nothing_seen();
     const auto picture = stage_.renderer().read_picture();
     if (!picture) return std::unexpected(picture.error());
     if (auto ok = write_png(plan_.screenshot, *picture); !ok) return ok;
   }
+  if (auto ok = report(); !ok) return ok;
+  return time_over() && whole_ms_ <= 0 ? nothing_seen() : Result<void>();
+}
+
+Result<void> Viewer::nothing_seen() const {
+  const Notice notice = stream_->words(now_ms());
+  return fail(
+      fmt::format("no whole picture in {} s: {}", *plan_.seconds, notice.alert.empty() ? notice.quiet : notice.alert));
+}
+
+Result<void> Viewer::report() {
   if (plan_.report.empty()) return {};
   if (auto ok = refresh_panel(); !ok) return ok;
   figures_.seconds = whole_ms_ > 0 ? (now_ms() - whole_ms_) / 1000 : 0;

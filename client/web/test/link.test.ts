@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import type {View} from '../src/page/camera.js';
-import {fromHash, toHash} from '../src/page/link.js';
+import {fromHash, isBroken, toHash} from '../src/page/link.js';
 
 test('a view comes back from its link, in a scene of 7 mm and one of 3 km', () => {
   for (const size of [0.007, 10, 3000]) {
@@ -29,4 +29,10 @@ test('a link that was cut or made up is no view', () => {
     '#view=1,2,3,0,0,170', '#view=1,2,3,0,0,<b>', '#other=1,2,3,4,5,60', '#view=0x10,2,3,0,0,60']) {
     assert.equal(fromHash(hash), null, hash);
   }
+});
+
+test('a link that names a view which cannot be drawn is told from one that names none', () => {
+  assert.ok(isBroken('#view=1,2,3'));
+  assert.ok(isBroken('#view=-3.8,1.5,0.44,-50,10,58.'), 'with the full stop of a sentence');
+  for (const hash of ['', '#', '#other=1', '#view=-3.64,1.75,-0.26,-109,2,58']) assert.ok(!isBroken(hash), hash);
 });

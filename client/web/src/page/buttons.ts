@@ -59,7 +59,10 @@ export class Buttons {
     this.owner.writeLink();
     try {
       await navigator.clipboard.writeText(location.href);
-      this.notices.quiet('The link to this view is copied.', 3);
+      const elsewhere = !/^(localhost|127\..*|\[::1\])$/.test(location.hostname);
+      this.notices.quiet(elsewhere ? 'The link to this view is copied.' :
+        'The link to this view is copied. It opens on this machine alone: others need its name in place of ' +
+        `${location.hostname}, and https.`, elsewhere ? 3 : 8);
     } catch {
       this.notices.quiet('The link to this view is in the address bar.', 5);
     }

@@ -16,6 +16,11 @@ export function toHash(view: View): string {
   return `#view=${values.join(',')}`;
 }
 
+/** It names a view, but not one that can be drawn. */
+export function isBroken(hash: string): boolean {
+  return hash.startsWith('#view=') && fromHash(hash) === null;
+}
+
 /** Null: there is no view in it, or one that cannot be drawn. */
 export function fromHash(hash: string): View | null {
   // Programs that pass links on write commas in another way, and add words of their own.

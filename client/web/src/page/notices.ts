@@ -3,6 +3,7 @@ import type {Sentence} from './requirements.js';
 
 /** Until there is a complete picture. */
 export const kWalkingIn = 'Walking in…';
+export const kBrokenLink = 'The view in this link cannot be read; the picture shows another one.';
 
 export class Notices {
   private hideTimer = 0;

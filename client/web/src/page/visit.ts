@@ -10,8 +10,8 @@ import type {Gl} from './gl_resources.js';
 import {Help} from './help.js';
 import type {InputOwner} from './input.js';
 import {Input} from './input.js';
-import {fromHash, toHash} from './link.js';
-import {kWalkingIn} from './notices.js';
+import {fromHash, isBroken, toHash} from './link.js';
+import {kBrokenLink, kWalkingIn} from './notices.js';
 import type {Notices} from './notices.js';
 import {Panel} from './panel.js';
 import {pick} from './pick.js';
@@ -107,6 +107,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
   private restoreTimer = 0;
   private shownFrame = 0;
   private linkTimer = 0;
+  private readonly linkBroken = isBroken(location.hash);  // said once there is a picture
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly gl: Gl, private readonly worker: Worker,
               private readonly notices: Notices, linked: View | null, early: FromWorker[]) {
@@ -405,6 +406,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
     this.status.firstPictureBytes = {geometry, coarse, stream: stream - coarse};
     performance.mark('darm first picture');
     if (this.status.joined) this.notices.quiet('');
+    if (this.linkBroken) this.notices.quiet(kBrokenLink, 8);
   }
 
   private noteDrawn(): void {
@@ -488,7 +490,7 @@ export class Visit implements InputOwner, ButtonsOwner, PresenceOwner {
 
   private followLink(): void {
     const view = fromHash(location.hash);
-    if (view === null) return;
+    if (view === null) return isBroken(location.hash) ? this.notices.quiet(kBrokenLink, 8) : undefined;
     this.rig.stop();
     this.rig.view = view;
     this.placedView = true;
