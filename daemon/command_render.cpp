@@ -1,4 +1,6 @@
 // darmd render: the unbiased reference picture of one camera, in two halves, with its own error.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -93,13 +95,31 @@ renderer::ReferenceJob job_of(const RenderCommand& command, const renderer::Ligh
 nlohmann::json report_of(const RenderCommand& command, const renderer::ReferencePicture& picture,
                          const renderer::ReferenceJob& job, const renderer::LightTransport& transport) {
   const double rate = picture.seconds > 0 ? static_cast<double>(picture.paths) / picture.seconds : 0.0;
-  return {{"camera", command.camera},   {"width", command.width},
-          {"height", command.height},   {"effects", command.view_independent ? "view-independent" : "full"},
-          {"spp", picture.spp},         {"reference_psnr", std::min(picture.own_psnr, kMostDecibels)},
-          {"exposure", job.exposure},   {"paths", picture.paths},
-          {"seconds", picture.seconds}, {"paths_per_second", rate},
-          {"threads", job.threads},     {"integrator", renderer::to_string(transport.effects())},
+  return {{"camera", command.camera},
+          {"width", command.width},
+          {"height", command.height},
+          {"effects", command.view_independent ? "view-independent" : "full"},
+          {"spp", picture.spp},
+          {"reference_psnr", std::min(picture.own_psnr, kMostDecibels)},
+          {"exposure", job.exposure},
+          {"doubtful_cut", picture.doubtful_cut},
+          {"paths", picture.paths},
+          {"seconds", picture.seconds},
+          {"paths_per_second", rate},
+          {"threads", job.threads},
+          {"integrator", renderer::to_string(transport.effects())},
           {"out", command.out.string()}};
+}
+
+constexpr double kMuchCut = 0.01;  // of the light
+
+std::string cut_words(double share) {
+  return fmt::format(
+      "{:.0f} % of the light is cut at white where the two halves do not agree that it is white: rare bright samples. "
+      "The "
+      "picture may be too dark by as much, and its own PSNR does not show it; a larger --spp or a smaller --exposure "
+      "leaves less",
+      100 * share);
 }
 
 std::string reached_words(const renderer::ReferencePicture& picture, double wanted) {
@@ -140,6 +160,7 @@ Result<std::optional<nlohmann::json>> render(const RenderCommand& command, const
     return std::nullopt;
   }
   if (job.until_psnr && picture->own_psnr < *job.until_psnr) progress.warn(reached_words(*picture, *job.until_psnr));
+  if (picture->doubtful_cut >= kMuchCut) progress.warn(cut_words(picture->doubtful_cut));
   if (auto written = write_pictures(command.out, *picture); !written) return std::unexpected(written.error());
   return report_of(command, *picture, job, transport);
 }

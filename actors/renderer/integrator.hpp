@@ -37,7 +37,7 @@ struct ViewDependentLight {
 
 /// Switches of the estimator. None changes the expectation, except for a `max_bounces` that cuts paths short.
 struct TransportOptions {
-  std::uint32_t max_bounces = 32;    ///< scatterings after the first vertex
+  std::uint32_t max_bounces = 128;  ///< scatterings after the first vertex: of a closed room of albedo .95 all but .2 %
   std::uint32_t roulette_after = 1;  ///< paths may end by chance from this bounce on
   /// For tests of multiple importance sampling: take emissive surfaces by one strategy only.
   enum class Emitters : std::uint8_t { kBoth, kByLight, kByDirection };

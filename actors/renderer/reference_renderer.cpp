@@ -174,6 +174,7 @@ Result<ReferencePicture> render_reference(const LightTransport& transport, const
   made.half_a = state.picture(0);
   made.half_b = state.picture(1);
   made.own_psnr = psnr_of_mean(made.half_a, made.half_b);
+  made.doubtful_cut = state.doubtful_cut();
   made.spp = 2 * state.passes;
   made.paths = std::uint64_t{state.width} * state.height * made.spp;
   made.seconds = state.seconds;

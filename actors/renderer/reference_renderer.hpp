@@ -47,6 +47,7 @@ struct ReferencePicture {
   Picture mean, half_a, half_b;
   double own_psnr =
       0;  ///< dB of the mean, from the halves: MSE = mean((sRGB(a) - sRGB(b))^2) / 4, the curve going on above 1
+  double doubtful_cut = 0;  ///< ReferenceState::doubtful_cut(): by so large a share it may be too dark
   std::uint64_t paths = 0;
   double seconds = 0;  ///< wall time over all runs
   std::uint32_t spp = 0;

@@ -10,6 +10,7 @@
 namespace darm::renderer {
 namespace {
 
+constexpr float kWhite = 1.0f;
 constexpr std::uint32_t kMostPasses = 1u << 30;        // of each half
 constexpr std::uint64_t kMagic = 0x32464552'4d524144;  // "DARMREF2"
 
@@ -56,8 +57,23 @@ ReferenceState::ReferenceState(std::uint64_t hash, std::uint32_t picture_width, 
   for (auto& half : halves) half.resize(std::size_t{width} * height * kQuarters);
 }
 
+double ReferenceState::doubtful_cut() const {
+  double cut = 0;
+  double kept = 0;
+  for (std::size_t q = 0; q < halves[0].size(); ++q) {
+    const auto& a = halves[0][q];
+    const auto& b = halves[1][q];
+    if (a.count + b.count == 0) continue;
+    const glm::vec3 both = mean_of(a, b, static_cast<float>(a.count), static_cast<float>(b.count));
+    for (int c = 0; c < 3; ++c) {
+      kept += std::clamp(double{both[c]}, 0.0, double{kWhite});
+      if (both[c] > kWhite && std::min(a.mean[c], b.mean[c]) < kWhite) cut += double{both[c]} - double{kWhite};
+    }
+  }
+  return cut > 0 ? cut / (cut + kept) : 0;
+}
+
 Picture ReferenceState::picture(int half) const {
-  constexpr float kWhite = 1.0f;
   Picture made{width, height, std::vector<glm::vec3>(std::size_t{width} * height)};
   for (std::size_t pixel = 0; pixel < made.pixels.size(); ++pixel) {
     glm::vec3 sum(0.0f);

@@ -37,6 +37,10 @@ struct ReferenceState {
   /// three pictures. Elsewhere a half keeps what its noise has above white: clamped by itself it would be darker than
   /// the truth by some of its noise, in both halves alike, which cancels nowhere.
   [[nodiscard]] Picture picture(int half) const;
+  /// Share of the light, 0..1, that picture(2) cuts at white where the halves do not agree that it is white: rare
+  /// bright samples, for the most part, by which the picture may be too dark. The halves have the same cut, so that
+  /// their difference does not show it.
+  [[nodiscard]] double doubtful_cut() const;
 };
 
 /// Writes beside `path` and renames, so that a reader sees the old state or the new one. Errors: disk; nothing is left

@@ -56,5 +56,19 @@ TEST(ReferenceState, the_mean_is_display_referred_and_lies_between_the_halves) {
     }
 }
 
+// Half the picture is white for certain; in the other half one sample in two is four times white, and what it brings
+// is cut: 1 of every 1 + 1 + 1 (that half's light, its cut, the certain half's).
+TEST(ReferenceState, light_that_is_cut_without_agreement_is_told) {
+  ReferenceState state(1, 2, 1);
+  for (std::size_t q = 0; q < kQuarters; ++q) {
+    state.halves[0][q].add(glm::vec3(3.0f));
+    state.halves[1][q].add(glm::vec3(2.0f));
+    state.halves[0][kQuarters + q].add(glm::vec3(4.0f));
+    state.halves[1][kQuarters + q].add(glm::vec3(0.0f));
+  }
+  EXPECT_NEAR(state.doubtful_cut(), 1.0 / 3.0, 1e-6);
+  EXPECT_EQ(ReferenceState(1, 2, 1).doubtful_cut(), 0.0);
+}
+
 }  // namespace
 }  // namespace darm::renderer
