@@ -80,19 +80,27 @@ std::string fault_of(const Json& value, const Range& range) {
   return {};
 }
 
+/// Empty: it is one of glTF's three, or not given.
+std::string fault_of_alpha_mode(const Json& material) {
+  const Json* mode = value_at(material, {{"", "", "alphaMode"}, 1, 0, 0});
+  const bool known = mode == nullptr || *mode == "OPAQUE" || *mode == "MASK" || *mode == "BLEND";
+  return known ? std::string() : "alphaMode is not OPAQUE, MASK or BLEND; OPAQUE is taken";
+}
+
 void warn_of(const Json& things, const char* kind, std::span<const Range> ranges, std::vector<std::string>& warnings) {
   if (!things.is_array()) return;
   std::size_t found = 0;
   for (std::size_t i = 0; i < things.size(); ++i) {
-    for (const Range& range : ranges) {
-      const Json* value = value_at(things[i], range);
-      const std::string fault = value != nullptr ? fault_of(*value, range) : std::string();
-      if (fault.empty() || ++found > kMostNamed) continue;
+    const auto note = [&](const std::string& fault) {
+      if (fault.empty() || ++found > kMostNamed) return;
       const Json* name = value_at(things[i], {{"", "", "name"}, 1, 0, 0});
       warnings.push_back(
           named(kind, i, name != nullptr && name->is_string() ? name->get<std::string>() : std::string()) + ": " +
           fault);
-    }
+    };
+    for (const Range& range : ranges)
+      if (const Json* value = value_at(things[i], range)) note(fault_of(*value, range));
+    note(fault_of_alpha_mode(things[i]));
   }
   if (found > kMostNamed)
     warnings.push_back(fmt::format("{} more values of {}s are taken otherwise than written", found - kMostNamed, kind));

@@ -323,6 +323,7 @@ TEST(GltfLoader, NamesAMaterialWhoseNumbersItReadsOtherwise) {
   EXPECT_THAT(pbr(R"("baseColorFactor":0.5)"), testing::ElementsAre(HasSubstr("not a list of 4 numbers")));
   EXPECT_THAT(warnings(R"("emissiveFactor":[30,0,0])"), testing::ElementsAre(HasSubstr("emissiveFactor 30")));
   EXPECT_THAT(extension("ior", R"("ior":0.5)"), testing::ElementsAre(HasSubstr("ior 0.5 is outside 1 to 100")));
+  EXPECT_THAT(warnings(R"("alphaMode":"X")"), testing::ElementsAre(HasSubstr("not OPAQUE, MASK or BLEND")));
   EXPECT_THAT(extension("transmission", R"("transmissionFactor":"1")"),
               testing::ElementsAre(HasSubstr("transmissionFactor is not a number; the default")));
 }
