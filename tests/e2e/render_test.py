@@ -22,14 +22,21 @@ class Render(unittest.TestCase):
         self.out = self.folder / "picture.png"
 
     def render(self, *more, state=None, spp="2"):
-        """Standard error of a run that must succeed and write the picture."""
+        """Standard error of a run that must succeed and write the picture, but for what two samples lack: each says it."""
         self.out.unlink(missing_ok=True)
         done = subprocess.run(
             [BIN / "darmd", "render", "--config", SET_UP, "--size", "32x18", "--spp", spp, "--state-dir",
              state or self.state, "--out", self.out, "--json", *more], capture_output=True, text=True, timeout=60)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertTrue(self.out.exists())
-        return done.stderr
+        return "".join(line for line in done.stderr.splitlines(True) if "cut at white" not in line)
+
+    def test_what_few_samples_cut_at_white_is_told(self):
+        done = subprocess.run(
+            [BIN / "darmd", "render", "--config", SET_UP, "--size", "32x18", "--spp", "2", "--state-dir", self.state,
+             "--out", self.out, "--json", "--camera", "hall"], capture_output=True, text=True, timeout=60)
+        self.assertGreater(json.loads(done.stdout)["doubtful_cut"], 0.01)
+        self.assertIn("% of the light is cut at white", done.stderr)
 
     def test_a_named_camera_may_be_moved_and_the_exposure_changed_a_little(self):
         setup = self.folder / "mine.toml"
