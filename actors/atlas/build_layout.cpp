@@ -31,7 +31,10 @@ class Packer {
  public:
   Packer(const scene::Scene& scene, const Charts& charts) : charts_(charts), order_(order_patches(scene, charts)) {
     triangles_.reserve(charts.charts.size());
-    for (const auto& c : charts.charts) triangles_.emplace_back(c);
+    for (const auto& c : charts.charts) {
+      triangles_.emplace_back(c);
+      for (const auto& size : c.patch_size) length_ += double{std::max(size.x, size.y)};
+    }
   }
 
   [[nodiscard]] Level pack(float density) const {
@@ -41,15 +44,18 @@ class Packer {
   [[nodiscard]] std::uint64_t own_texels(float density) const {
     return footprints_at(charts_, triangles_, order_, density).texels;
   }
-  /// Texels by area alone: a lower bound that costs nothing.
+  /// Texels by area and length alone: a lower bound that costs nothing. A patch has a texel in every row of its long
+  /// side, so that needles, which have next to no area, are not laid out at a density that takes hours.
   [[nodiscard]] double least_texels(float density) const {
-    return std::max(charts_.surface_area * density * density, static_cast<double>(charts_.patch_count));
+    return std::max(
+        {charts_.surface_area * density * density, length_ * density, static_cast<double>(charts_.patch_count)});
   }
 
  private:
   const Charts& charts_;
   PackOrder order_;
   std::vector<PatchTriangles> triangles_;
+  double length_ = 0;  // of the long sides of all charts' patches, world units
 };
 
 /// Exponent of the densest q that is worth a look: 16 suits rooms and halls, and a scene of less than 256 m has as
