@@ -24,11 +24,11 @@ struct TcpListener::State {
   void on_socket(tcp::socket socket) {
     const auto peer = peer_of(socket);
     if (!tls) return door->admit(make_connection(std::move(socket)), peer);
-    const auto ready = [door = door, peer](const std::shared_ptr<Connection>& connection) {
-      door->admit(connection, peer);
-    };
-    if (!greet(std::move(socket), tls, pending, peer, ready))
-      door->metrics().count("darm_session_events_total", 1, {{"what", "tcp_crowded"}});
+    greet(
+        std::move(socket), tls, pending, peer,
+        {.ready = [door = door, peer](const std::shared_ptr<Connection>& connection) { door->admit(connection, peer); },
+         .lost = [door = door](
+                     const char* event) { door->metrics().count("darm_session_events_total", 1, {{"what", event}}); }});
   }
 
   std::shared_ptr<SessionDoor> door;

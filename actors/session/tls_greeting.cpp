@@ -23,27 +23,25 @@ constexpr std::uint8_t kTlsHandshake = 0x16;
 
 class Greeting : public std::enable_shared_from_this<Greeting> {
  public:
-  Greeting(tcp::socket socket, std::shared_ptr<asio::ssl::context> tls,
-           std::function<void(std::shared_ptr<Connection>)> ready)
+  Greeting(tcp::socket socket, std::shared_ptr<asio::ssl::context> tls, Greeter greeter)
       : tls_(std::move(tls)),
         stream_(std::move(socket), *tls_),
         timer_(lowest().get_executor()),
-        ready_(std::move(ready)) {}
+        greeter_(std::move(greeter)) {}
 
-  bool begin(PendingSockets& pending, const std::string& peer) {
+  void begin(PendingSockets& pending, const std::string& peer) {
     auto place = pending.enter(
         [weak = weak_from_this()] {
           if (const auto self = weak.lock()) self->close_soon();
         },
         peer);
-    if (!place) return false;  // closed with this object
+    if (!place) return greeter_.lost("tcp_crowded");  // closed with this object
     place_.emplace(std::move(*place));
     timer_.expires_after(kGreetingTime);
     timer_.async_wait([self = shared_from_this()](error_code ec) {
-      if (!ec) self->close();
+      if (!ec) self->lose();
     });
     lowest().async_wait(tcp::socket::wait_read, [self = shared_from_this()](error_code ec) { self->look(ec); });
-    return true;
   }
 
  private:
@@ -57,14 +55,21 @@ class Greeting : public std::enable_shared_from_this<Greeting> {
     error_code ignored;
     lowest().close(ignored);
   }
+  // What was waited for will not come. Closing ends the other wait too, which finds nothing left to lose.
+  void lose() {
+    if (!lowest().is_open()) return;
+    close();
+    greeter_.lost(hears_ ? "handshake_failed" : "said_nothing");
+  }
 
   void look(error_code ec) {
     std::uint8_t first = 0;
     if (ec || !lowest().is_open() || ::recv(lowest().native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1)
-      return close();
+      return lose();
     if (first != kTlsHandshake) return finish(make_connection(std::move(lowest())));
+    hears_ = true;
     stream_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](error_code failed) {
-      if (failed) return self->close();
+      if (failed) return self->lose();
       self->finish(make_connection(std::move(self->stream_), self->tls_));
     });
   }
@@ -72,21 +77,22 @@ class Greeting : public std::enable_shared_from_this<Greeting> {
   void finish(std::shared_ptr<Connection> connection) {
     timer_.cancel();
     place_.reset();
-    ready_(std::move(connection));
+    greeter_.ready(std::move(connection));
   }
 
   std::shared_ptr<asio::ssl::context> tls_;
   TlsSocket stream_;
   asio::steady_timer timer_;
-  std::function<void(std::shared_ptr<Connection>)> ready_;
+  Greeter greeter_;
   std::optional<PendingSockets::Place> place_;
+  bool hears_ = false;  // a handshake has begun
 };
 
 }  // namespace
 
-bool greet(tcp::socket socket, const std::shared_ptr<asio::ssl::context>& tls, PendingSockets& pending,
-           const std::string& peer, std::function<void(std::shared_ptr<Connection>)> ready) {
-  return std::make_shared<Greeting>(std::move(socket), tls, std::move(ready))->begin(pending, peer);
+void greet(tcp::socket socket, const std::shared_ptr<asio::ssl::context>& tls, PendingSockets& pending,
+           const std::string& peer, Greeter greeter) {
+  std::make_shared<Greeting>(std::move(socket), tls, std::move(greeter))->begin(pending, peer);
 }
 
 }  // namespace darm::session

@@ -44,11 +44,20 @@ class Client:
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port))
         self.connected = True
+
+    def enter(self):
+        self.hello()
+        return self.welcomed()
+
+    def hello(self):
         self.send(HELLO, field(1, VERSION) + field(2, b"rude") + field(4, 2048))
+
+    def welcomed(self):
         answer = self.socket.recv(5, socket.MSG_WAITALL)
         if len(answer) < 5 or answer[4] != WELCOME << 3 | 2:
             raise AssertionError("no welcome but " + repr(answer))
         threading.Thread(target=self.drain, daemon=True).start()
+        return self
 
     def drain(self):
         try:
@@ -70,7 +79,7 @@ class RudeClients(unittest.TestCase):
     def test_the_largest_viewport_in_motion_holds_up_neither_others_nor_the_stop(self):
         with Folder() as folder:
             daemon = Daemon(Path(folder) / "state")
-            rude = [Client(daemon.tcp) for _ in range(2)]
+            rude = [Client(daemon.tcp).enter() for _ in range(2)]
             done = threading.Event()
 
             def move():
@@ -99,6 +108,22 @@ class RudeClients(unittest.TestCase):
             self.assertEqual(still_there, [True, True])  # or nobody was rude
             self.assertLess(report["seconds_to_first_image"], 3)
             self.assertLess(stopped, 3)
+
+    def test_a_daemon_that_was_held_up_lets_in_who_spoke_in_time_and_counts_who_did_not(self):
+        with Folder() as folder:
+            daemon = Daemon(Path(folder) / "state")
+            self.addCleanup(daemon.process.kill)
+            speaks, silent = Client(daemon.tcp), Client(daemon.tcp)
+            time.sleep(0.5)  # both are accepted, and have ten seconds
+            daemon.process.send_signal(signal.SIGSTOP)
+            speaks.hello()
+            time.sleep(11)
+            daemon.process.send_signal(signal.SIGCONT)
+            speaks.welcomed()
+            silent.socket.settimeout(5)
+            self.assertEqual(silent.socket.recv(1), b"")
+            self.assertEqual(daemon.values()['darm_session_events_total{what="said_nothing"}'], 1)
+            self.assertEqual(daemon.stop(), 0)
 
     def test_who_connects_to_the_metrics_and_says_nothing_does_not_hold_up_the_stop(self):
         with Folder() as folder:
