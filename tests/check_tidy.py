@@ -75,7 +75,8 @@ def check(group, flags):
         half = len(group) // 2
         parts = [check(group[:half], flags), check(group[half:], flags)]
         return "".join(output for output, _ in parts), any(bad for _, bad in parts)
-    return run.stdout, run.returncode != 0
+    fault = run.returncode != 0
+    return (run.stdout or run.stderr) if fault else "", fault
 
 
 def main():
@@ -84,7 +85,11 @@ def main():
         return 2
     flags = compile_flags(sys.argv[1])
     named = [os.path.relpath(os.path.realpath(name), ROOT) for name in sys.argv[2:]]
-    names = [name for name in named if os.path.realpath(ROOT / name) in flags] if named else list(sources(flags))
+    names = sorted(set(named)) or list(sources(flags))
+    unknown = [name for name in names if os.path.realpath(ROOT / name) not in flags]
+    if unknown or not names:
+        print(f"tidy: {', '.join(unknown) or 'no sources'}: not in {sys.argv[1]}/compile_commands.json", file=sys.stderr)
+        return 2
 
     def timed(group):
         begin = time.monotonic()
