@@ -104,7 +104,9 @@ int main(int argc, char** argv) {
   std::printf("closest %.2f M rays/s, bare Embree %.2f M rays/s, ratio %.3f; occluded %.2f M rays/s (one thread)\n",
               ours / 1e6, bare / 1e6, ours / bare, shadow / 1e6);
 
-  const LightTransport transport(*scene, *rays);
+  renderer::TransportOptions options;
+  options.max_bounces = 32;  // as Cycles was run
+  const LightTransport transport(*scene, *rays, options);
   start = Clock::now();
   const float exposure = scene_exposure(transport);
   std::printf("exposure %g in %.2f s\n", static_cast<double>(exposure), seconds_since(start));

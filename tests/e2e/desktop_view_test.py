@@ -121,6 +121,14 @@ class DesktopView(unittest.TestCase):
             self.assertEqual(f"{width}x{height}", SIZE)
             self.assertGreater(max(picture), 100, "it is not black")
 
+    def test_who_has_seen_nothing_says_so_without_a_screenshot_too(self):
+        with Display() as display:
+            view = subprocess.run(
+                [BIN / "darm-view", "127.0.0.1:1", "--size", SIZE, "--after", "2"],  # nobody listens there
+                env={**os.environ, "DISPLAY": display.name}, stderr=subprocess.PIPE, text=True, timeout=60)
+            self.assertEqual(view.returncode, 1)
+            self.assertIn("no whole picture in 2 s", view.stderr)
+
     def test_tls_is_spoken_with_a_server_that_is_vouched_for(self):
         with Folder() as folder, Display() as display:
             state = Path(folder) / "state"

@@ -66,6 +66,11 @@ TEST(SceneModel, RefusesHostileManifests) {
       [](auto& m) { m.set_coarse_coverage("short"); },
       [](auto& m) { m.set_coarse_coverage(synthetic::deflate(std::string(899, '0'))); },
       [](auto& m) { m.set_coarse_coverage(synthetic::deflate(std::string(901, '0'))); },
+      [](auto& m) {  // more than CoarseTex can be, though its bytes would fit
+        auto& last = *m.mutable_levels(m.levels_size() - 1);
+        last.set_tiles_x(70), last.set_tiles_y(70), last.set_width(2100), last.set_height(2100);
+        m.set_coarse_coverage(synthetic::deflate(std::string(std::size_t{2100} * 2100, '0')));
+      },
       [](auto& m) { m.mutable_origin()->set_x(INFINITY); },
       [](auto& m) { m.add_sun(1); },
       [](auto& m) { m.set_geometry_chunks(0xffffffffu); },

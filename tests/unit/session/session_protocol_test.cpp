@@ -406,6 +406,20 @@ tile_scheduler::LinkState link_of(const Actions& actions) {
   return it == actions.end() ? tile_scheduler::LinkState::kFree : std::get<tile_scheduler::LinkChanged>(*it).state;
 }
 
+TEST_F(SessionProtocolTest, who_pings_without_reading_is_answered_some_hundred_times) {
+  start();
+  (void)say(hello());
+  (void)heard();
+  wire::Envelope ping;
+  ping.mutable_ping()->set_time_us(5);
+  for (int i = 0; i < 20'000; ++i) (void)say(ping);
+  const auto pongs = heard().size();
+  EXPECT_GT(pongs, 100u);
+  EXPECT_LT(pongs, 5'000u);
+  (void)say(ping);
+  EXPECT_EQ(heard().size(), 1u) << "who reads again is answered again";
+}
+
 TEST_F(SessionProtocolTest, the_scheduler_hears_when_the_link_is_full_and_when_it_is_free_again) {
   using tile_scheduler::LinkState;
   start();
