@@ -87,7 +87,9 @@ std::string fault_of_alpha_mode(const Json& material) {
   return known ? std::string() : "alphaMode is not OPAQUE, MASK or BLEND; OPAQUE is taken";
 }
 
-void warn_of(const Json& things, const char* kind, std::span<const Range> ranges, std::vector<std::string>& warnings) {
+/// `more`: a fault of another kind, empty where there is none.
+void warn_of(const Json& things, const char* kind, std::span<const Range> ranges, std::string (*more)(const Json&),
+             std::vector<std::string>& warnings) {
   if (!things.is_array()) return;
   std::size_t found = 0;
   for (std::size_t i = 0; i < things.size(); ++i) {
@@ -100,7 +102,7 @@ void warn_of(const Json& things, const char* kind, std::span<const Range> ranges
     };
     for (const Range& range : ranges)
       if (const Json* value = value_at(things[i], range)) note(fault_of(*value, range));
-    note(fault_of_alpha_mode(things[i]));
+    if (more != nullptr) note(more(things[i]));
   }
   if (found > kMostNamed)
     warnings.push_back(fmt::format("{} more values of {}s are taken otherwise than written", found - kMostNamed, kind));
@@ -110,9 +112,9 @@ void warn_of(const Json& things, const char* kind, std::span<const Range> ranges
 
 void warn_of_ranges(const Json& root, std::vector<std::string>& warnings) {
   if (const auto materials = root.find("materials"); materials != root.end())
-    warn_of(*materials, "material", kOfMaterials, warnings);
+    warn_of(*materials, "material", kOfMaterials, fault_of_alpha_mode, warnings);
   if (const Json* lights = value_at(root, {{"extensions", "KHR_lights_punctual", "lights"}, 1, 0, 0}))
-    warn_of(*lights, "light", kOfLights, warnings);
+    warn_of(*lights, "light", kOfLights, nullptr, warnings);
 }
 
 }  // namespace darm::scene::gltf

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -30,7 +29,7 @@ struct ViewMaterial {
     const float last = static_cast<float>(omitted.size() - 1);
     const float at = cosine > 0 ? std::clamp(cosine * static_cast<float>(omitted.size()) - 0.5f, 0.0f, last) : 0.0f;
     const auto part = std::min(static_cast<std::size_t>(at), omitted.size() - 2);
-    return std::lerp(omitted[part], omitted[part + 1], at - static_cast<float>(part));
+    return omitted[part] + (omitted[part + 1] - omitted[part]) * (at - static_cast<float>(part));
   }
 };
 
