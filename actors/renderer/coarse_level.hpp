@@ -32,6 +32,8 @@ class CoarseRounds {
   [[nodiscard]] bool opening() const { return round_ == 0 && !opened_ && !finished(); }
   /// What somebody sees now: while the first picture is not there, it comes first and is enough for one.
   void prefer(std::span<const CoarseRequest> seen);
+  /// Every texel has two samples.
+  [[nodiscard]] bool even() const { return round_ > 2; }
   [[nodiscard]] int level() const { return level_; }
   [[nodiscard]] const LevelTiles& tiles() const { return tiles_; }
 

@@ -110,9 +110,11 @@ void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<Filtere
       for (std::size_t x = 0; x < kLanes; ++x) {
         if (w.patch[first + x] == kNoTexelPatch || fitted.weight[x] < kLeastFitWeight) continue;
         auto& texel = out[static_cast<std::size_t>(y * kSlotSize + b * kLanes) + x];
-        texel = {{fitted.value[0][x], fitted.value[1][x], fitted.value[2][x]}, fitted.noise[x], 1, 0, true};
+        texel = {.irradiance = {fitted.value[0][x], fitted.value[1][x], fitted.value[2][x]},
+                 .variance = fitted.noise[x],
+                 .known = true};
         if (texel.variance > 0) texel.texels = std::max(1.0f, variance_[first + x] / texel.variance);
-        texel.smear = smear_of(first + x, texel, fitted.weight[x]) + w.held_down * w.held_down;
+        texel.smear = smear_of(first + x, texel, fitted.weight[x]);
         texel.variance *= statistics_.evenness();
       }
     }

@@ -15,11 +15,14 @@ namespace darm::renderer {
 /// Filtered texel.
 struct FilteredTexel {
   std::array<float, 3> irradiance{};
-  float variance = 0;  ///< of its grey value: noise
-  float texels = 1;    ///< so many gave to it, by what they took of the noise; >= 1
+  /// What outliers lost here and is not to be shown: right in the mean over many texels, not in this one.
+  std::array<float, 3> withheld{};
+  float lost_error = 0;  ///< what is shown of what they lost is off by: luminance, RMS
+  float variance = 0;    ///< of its grey value: noise
+  float texels = 1;      ///< so many gave to it, by what they took of the noise; >= 1
   /// Square of what the filter has smeared of its grey value: the square difference to the mean it was compared by
-  /// (of fewer texels, at borders only of those along it), less what noise alone makes of that; and the square of what
-  /// outliers were held down by. Below 0 by chance: only sums over many texels say something.
+  /// (of fewer texels, at borders only of those along it), less what noise alone makes of that. Below 0 by chance: only
+  /// sums over many texels say something.
   float smear = 0;
   bool known = false;
 };

@@ -31,7 +31,6 @@ struct FilterWindow {
   std::vector<float> grey_m2;                    ///< sum of squared deviations of the samples of `grey`
   std::vector<float> tint;   ///< what soft light is multiplied with on display (linear, exposed), luminance
   std::vector<float> floor;  ///< all other light of the texel on display (linear, exposed), luminance
-  float held_down = 0;       ///< of grey, mean a texel that has samples: what tame_outliers() took
 
   void reset(int new_radius) {
     radius = std::clamp(new_radius, 0, kMaxFilterRadius);
@@ -40,7 +39,6 @@ struct FilterWindow {
     patch.assign(n, kNoTexelPatch);
     for (auto* plane : {&count, &grey, &grey_m2, &tint, &floor}) plane->assign(n, 0.0f);
     for (auto& plane : irradiance) plane.assign(n, 0.0f);
-    held_down = 0;
   }
   /// So few samples that they say nothing of their own noise.
   [[nodiscard]] bool first_pass() const {

@@ -1,7 +1,11 @@
 // Keeps rare bright samples from being smeared into spots while there are too few samples to average them away.
 #pragma once
 
-#include "actors/renderer/filter_window.hpp"
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "actors/types/tile_id.hpp"
 
 namespace darm::renderer {
 
@@ -11,20 +15,27 @@ inline constexpr float kOutlierSamples = 1024;
 /// How many times the mean of its neighbours (5x5, same patch, itself left out) a texel of `count` samples may shine:
 /// 2 + 24 / count + count / 64. One sample may be many times the mean and still be what light is like there (a window
 /// that one direction in twenty meets): held to twice its neighbours it costs Sponza's atrium 4 dB. In the limit
-/// nothing is held down; what is held down meanwhile is shared out in the picture as far as it is to be trusted, and
-/// the store knows nothing of it.
+/// nothing is held down; what is held down meanwhile is shared out in the picture as far as it is to be trusted
+/// (LostLight), and the store knows nothing of it.
 [[nodiscard]] float outlier_bound(float count);
 
-/// How much of what was taken from a patch's texels in a window is shared out, 0..1. What one texel lost says little of
-/// the others, and in full it would show as a bright square: it may at most double their light. `taken`, `squares`: sum
-/// of what texels lost, and of its squares; `left`: sum of what all of the patch have left. With n texels that lost
-/// alike: 1 - 1 / n, and left / taken. Doubles: of one texel's 1 - squares / taken^2 is to be nothing, not a rounding
-/// error that is much beside `left`.
-[[nodiscard]] float share_to_trust(double taken, double squares, double left);
+/// Soft light of a square of texels, row-major: what outliers are judged by.
+struct LightSquare {
+  int size = 0;
+  std::vector<std::uint32_t> patch;
+  std::vector<float> count;  ///< samples; 0: says nothing
+  std::vector<float> grey;   ///< luminance of their mean
 
-/// Scales texels brighter than their bound down to it, irradiance, grey and spread alike, and says how much that was.
-/// What was taken goes to all texels of the patch in the window alike, as far as it is to be trusted: where many lost
-/// something the mean stays.
-void tame_outliers(FilterWindow& window);
+  void reset(int new_size);
+};
+
+/// The texel at `at` of a LightSquare is `scale`, 0..1, times as bright as it would be.
+struct Outlier {
+  std::size_t at = 0;
+  float scale = 1;
+};
+
+/// Texels brighter than their bound, in order. Of a texel too few of whose neighbours have samples nothing is said.
+void find_outliers(const LightSquare& square, std::vector<Outlier>& found);
 
 }  // namespace darm::renderer

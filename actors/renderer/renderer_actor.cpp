@@ -17,8 +17,11 @@ namespace darm::renderer {
 namespace {
 
 constexpr std::size_t kPicturesPerSlice = 8;
+constexpr float kRareLight = 0.2f;      // of what the coarse level shows
+constexpr double kPressingShare = 0.5;  // of shading
+
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
-constexpr std::uint64_t kDisplayVersion = 5;
+constexpr std::uint64_t kDisplayVersion = 6;
 
 // What a stored picture depends on beside its light.
 std::uint64_t picture_tag_of(const DisplayOptions& display) {
@@ -70,6 +73,7 @@ struct RendererActor::Shared {
 struct RendererActor::JobResult {
   ShadingResult shading;
   std::optional<TilePicture> picture;
+  std::optional<float> lost_share;  // of a tile of the coarse level that has light, as TilePicture has it
   double seconds = 0;
   bool failed = false;
 };
@@ -131,11 +135,21 @@ void RendererActor::on(SliceFinished&& message) {
   }
 }
 
+// Much of the scene's light is in rare samples.
+bool RendererActor::rare_light() const { return coarse_lost_share_ > kRareLight; }
+
+// There samples of the coarse level, which paths end in, are worth most.
+double RendererActor::coarse_share() const {
+  if (coarse_.finished()) return 0;
+  const bool pressing = rare_light() && !coarse_.even();
+  return pressing ? kPressingShare : double{shared_->parts.options.coarse_share};
+}
+
 std::vector<TileJob> RendererActor::choose_jobs() {
   const auto& options = shared_->parts.options;
   const double budget = std::max(64.0, double{options.batch_ms} * 1000.0 * executor().workers() / sample_us_);
   if (coarse_.opening()) return coarse_.next_batch(static_cast<std::uint64_t>(budget));
-  const double share = coarse_.finished() ? 0.0 : double{options.coarse_share};
+  const double share = coarse_share();
   auto jobs = schedule_.next_batch(static_cast<std::uint64_t>(budget * (1.0 - share)));
   // The coarse level earns its share of what visible tiles cost; with nothing visible it has all.
   std::uint64_t cost = 0;
@@ -350,9 +364,17 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
       batch.light->put(job.tile.index(), texels);
     }
     if (picture) batch.canvas->put(job.tile.index(), *picture->image);
+    if (picture && picture->samples > 0) batch.results[index].lost_share = picture->lost_share;
   } else {
     batch.results[index].picture = std::move(picture);
   }
+}
+
+float RendererActor::mean_lost_share(const Batch& batch) {
+  float sum = 0, tiles = 0;
+  for (const JobResult& r : batch.results)
+    if (r.lost_share) sum += *r.lost_share, ++tiles;
+  return tiles > 0 ? sum / tiles : 0.0f;
 }
 
 void RendererActor::finish_pictures() {
@@ -362,7 +384,8 @@ void RendererActor::finish_pictures() {
     JobResult& r = batch_->results[i];
     if (job.coarse) continue;
     if (!job.recall)
-      schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f);
+      schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f,
+                         r.picture && rare_light() ? r.picture->lost_share : 0.0f);
     else if (r.picture)
       schedule_.recalled(job.tile, r.picture->error, r.picture->samples);
     if (!r.picture) continue;
@@ -385,6 +408,7 @@ void RendererActor::finish_pictures() {
     }
   }
   if (batch_->light) {  // no slice runs now
+    coarse_lost_share_ = mean_lost_share(*batch_);
     shared_->parts.surfaces->use_stored_light(batch_->light);
     shared_->light = batch_->light;
   }

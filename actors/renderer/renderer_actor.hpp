@@ -69,6 +69,9 @@ class RendererActor : public runtime::Actor<Inbox> {
   void post_slices(const std::shared_ptr<Batch>& batch, std::vector<std::size_t> starts,
                    void (*work)(Shared&, Batch&, std::size_t));
   [[nodiscard]] std::vector<TileJob> choose_jobs();
+  [[nodiscard]] bool rare_light() const;
+  [[nodiscard]] double coarse_share() const;
+  [[nodiscard]] static float mean_lost_share(const Batch& batch);
   static void shade_one(Shared& shared, Batch& batch, std::size_t index);
   static void picture_one(Shared& shared, Batch& batch, std::size_t index);
   void learn_cost(double seconds, std::uint64_t samples);
@@ -85,7 +88,8 @@ class RendererActor : public runtime::Actor<Inbox> {
   double sample_us_ = 12;  // running estimate of one sample's time on one worker
   std::uint32_t picture_number_ = 0;
   std::uint32_t coarse_number_ = 0;
-  double coarse_credit_ = 0;  // samples the coarse level may take
+  double coarse_credit_ = 0;     // samples the coarse level may take
+  float coarse_lost_share_ = 0;  // mean of its tiles, as TilePicture has it
   bool coarse_due_ = false;
 };
 

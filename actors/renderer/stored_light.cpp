@@ -52,9 +52,13 @@ std::array<StoredTexel, kTileTexels> stored_texels(const atlas::TileView& tile,
     const bool smooth = slot < filtered.size() && filtered[slot].known;
     if (!smooth && tile.count(Layer::kSoft, t) <= 0) continue;
     glm::vec3 soft = tile.mean(Layer::kSoft, t);
-    if (smooth) soft = {filtered[slot].irradiance[0], filtered[slot].irradiance[1], filtered[slot].irradiance[2]};
     const float grey = luminance(soft);
-    const float noise = smooth ? filtered[slot].variance : tile.variance_of_mean(Layer::kSoft, t, grey * grey);
+    float noise = tile.variance_of_mean(Layer::kSoft, t, grey * grey);
+    if (smooth) {
+      const FilteredTexel& from = filtered[slot];
+      for (std::size_t c = 0; c < 3; ++c) soft[static_cast<int>(c)] = from.irradiance[c] + from.withheld[c];
+      noise = from.variance + from.lost_error * from.lost_error;
+    }
     texel = {tile.mean(Layer::kSharp, t), soft, true, noise};
   }
   return out;

@@ -101,6 +101,72 @@ bool TileDisplay::wants_filter(const TexelMask& mask) const {
   return false;
 }
 
+// The nine tiles, as they were measured.
+void TileDisplay::find_lost() {
+  square_.reset(3 * kTileSize);
+  for (int tile = 0; tile < 9; ++tile) {
+    const auto& from = around_[static_cast<std::size_t>(tile)];
+    if (!from.facts || !from.light) continue;
+    for (int t = 0; t < kTileTexels; ++t) {
+      const float n = from.light->count(Layer::kSoft, t);
+      const auto at = static_cast<std::size_t>((tile / 3 * kTileSize + t / kTileSize) * square_.size +
+                                               tile % 3 * kTileSize + t % kTileSize);
+      square_.patch[at] = from.facts->patch[static_cast<std::size_t>(t)];
+      if (n <= 0 || square_.patch[at] == kNobody || from.light->lightless(t)) continue;
+      square_.count[at] = n;
+      square_.grey[at] = luminance(from.light->mean(Layer::kSoft, t));
+    }
+  }
+  find_outliers(square_, outliers_);
+  lost_.clear();
+  for (const Outlier& outlier : outliers_) {
+    const int x = static_cast<int>(outlier.at) % square_.size;
+    const int y = static_cast<int>(outlier.at) / square_.size;
+    const int tile = y / kTileSize * 3 + x / kTileSize;
+    const int texel = y % kTileSize * kTileSize + x % kTileSize;
+    const glm::vec3 soft = around_[static_cast<std::size_t>(tile)].light->mean(Layer::kSoft, texel);
+    lost_.take(tile, square_.patch[outlier.at], soft * (1 - outlier.scale),
+               square_.grey[outlier.at] * (1 - outlier.scale));
+  }
+  lost_.measure(square_);
+}
+
+// In the window as it was measured.
+void TileDisplay::tame() {
+  const int margin = kTileSize - 1 - window_.radius;  // of the nine tiles, around the window
+  for (const Outlier& outlier : outliers_) {
+    const int x = static_cast<int>(outlier.at) % square_.size - margin;
+    const int y = static_cast<int>(outlier.at) / square_.size - margin;
+    if (x < 0 || y < 0 || x >= window_.size || y >= window_.size) continue;
+    const auto at = static_cast<std::size_t>(y * window_.size + x);
+    for (auto& channel : window_.irradiance) channel[at] *= outlier.scale;
+    window_.grey[at] *= outlier.scale;
+    window_.grey_m2[at] *= outlier.scale * outlier.scale;
+  }
+}
+
+void TileDisplay::share_out() {
+  lost_share_ = 0;
+  if (lost_.empty()) return;
+  double lost = 0, shown = 0;
+  for (int y = 0; y < kSlotSize; ++y)
+    for (int x = 0; x < kSlotSize; ++x) {
+      auto& texel = filtered_[static_cast<std::size_t>(y * kSlotSize + x)];
+      if (!texel.known) continue;
+      const auto at = static_cast<std::size_t>((y + window_.radius) * window_.size + x + window_.radius);
+      const auto share = lost_.at(window_.patch[at], x, y);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float all = share.irradiance[static_cast<int>(c)];
+        texel.irradiance[c] += all * share.trusted;
+        texel.withheld[c] = all * (1 - share.trusted);
+      }
+      texel.lost_error = share.error;
+      lost += double{share.grey};
+      shown += double{luminance({texel.irradiance[0], texel.irradiance[1], texel.irradiance[2]})};
+    }
+  lost_share_ = shown > 0 ? static_cast<float>(lost / shown) : 0.0f;
+}
+
 void TileDisplay::gather() {
   window_.reset(kMaxFilterRadius);
   for (int y = 0; y < window_.size; ++y) {
@@ -149,7 +215,7 @@ TileDisplay::Lit TileDisplay::light_of(const Neighbour& from, int texel, const F
     lit.has_soft = true;
     lit.soft = {
         {filtered.irradiance[0], filtered.irradiance[1], filtered.irradiance[2]}, filtered.variance, filtered.texels};
-    lit.smear = filtered.smear;
+    lit.smear = filtered.smear + filtered.lost_error * filtered.lost_error;
   } else if (from.light->count(Layer::kSoft, texel) > 0) {
     lit.has_soft = true;
     lit.soft.mean = from.light->mean(Layer::kSoft, texel);
@@ -245,11 +311,14 @@ float TileDisplay::error_of(const TexelMask& mask, const SlotColours& colours,
 std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level, const TexelMask& mask, Unlit unlit) {
   look_around(id, level);
   if (wants_filter(mask)) {
+    find_lost();
     gather();
-    tame_outliers(window_);
+    tame();
     filter_.run(window_, options_.filter_samples, filtered_);
+    share_out();
   } else {
     filtered_.assign(kSlotTexels, FilteredTexel{});
+    lost_share_ = 0;
   }
   SlotColours colours;
   shade_slot(id, level, colours);
@@ -273,6 +342,7 @@ std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level,
   TilePicture picture;
   picture.error = error_of(mask, colours, known, picture.samples);
   picture.image = std::move(image);
+  picture.lost_share = lost_share_;
   return picture;
 }
 

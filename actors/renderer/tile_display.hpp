@@ -8,6 +8,8 @@
 
 #include "actors/atlas/radiance_store.hpp"
 #include "actors/renderer/filter_irradiance.hpp"
+#include "actors/renderer/lost_light.hpp"
+#include "actors/renderer/outliers.hpp"
 #include "actors/renderer/stored_light.hpp"
 #include "actors/renderer/tile_facts.hpp"
 #include "actors/types/tile_image.hpp"
@@ -29,6 +31,8 @@ struct TilePicture {
   /// noise, and what the filter smears and holds down.
   float error = 0;
   float samples = 0;  ///< mean samples per texel of the mask
+  /// Of soft light, mean over its texels: what outliers lost, in this tile and those beside it, over what is shown.
+  float lost_share = 0;
 };
 
 /// What patches of a slot show of which nothing is known.
@@ -63,7 +67,10 @@ class TileDisplay {
   };
   void look_around(TileId id, const LevelTiles& level);
   [[nodiscard]] bool wants_filter(const TexelMask& mask) const;
+  void find_lost();
   void gather();
+  void tame();
+  void share_out();
   struct Lit {
     bool lightless = false;
     bool has_sharp = false;
@@ -86,6 +93,10 @@ class TileDisplay {
   DisplayOptions options_;
   const StoredLight* coarse_;
   std::array<Neighbour, 9> around_;
+  LightSquare square_;
+  std::vector<Outlier> outliers_;
+  LostLight lost_;
+  float lost_share_ = 0;
   FilterWindow window_;
   IrradianceFilter filter_;
   std::vector<FilteredTexel> filtered_;

@@ -10,6 +10,7 @@ constexpr std::uint32_t kSurveyCost = 40;  // samples' worth of time
 constexpr double kHiddenShare = 0.02;      // weight of tiles that serve only as borders
 constexpr double kFirstGain = 0.0003;  // of a first pass, for each level that the coarse one is coarser twice as much
 constexpr double kTileCost = 300;      // samples' worth of time for a tile's map, facts and picture
+constexpr float kBorrows = 0.1f;       // of a tile's light
 constexpr float kLeastForTarget = 16;  // an error estimate of fewer samples is not believed
 }  // namespace
 
@@ -145,7 +146,6 @@ void TileSchedule::shaded(TileId tile, const TileProgress& progress, std::uint32
   const auto it = tiles_.find(tile);
   if (it == tiles_.end()) return;
   State& s = it->second;
-  const bool first_light = s.progress.mean <= 0 && progress.mean > 0;
   if (samples > 0 && (!s.surveyed || s.progress.unshaded > 0)) s.fresh_texels = true;
   // Texels that somebody else had shaded: their light is there, the picture was drawn without knowing their albedo.
   if (s.pictured_mean >= 0 && !s.recalled && !s.shown.contains(s.mask)) s.fresh_texels = true;
@@ -153,10 +153,14 @@ void TileSchedule::shaded(TileId tile, const TileProgress& progress, std::uint32
   s.surveyed = true;
   s.stored = s.stored || samples > 0;
   s.failures = 0;
-  if (!first_light) return;
-  for (const auto beside : beside_of(tile))
-    if (const auto n = tiles_.find(beside); n != tiles_.end() && n->second.pictured_mean >= 0)
-      n->second.stale_border = true;
+  if (progress.mean <= 0 || progress.mean < s.told_mean * options_.publish_growth) return;
+  const bool first_light = s.told_mean <= 0;
+  s.told_mean = progress.mean;
+  for (const auto beside : beside_of(tile)) {
+    const auto n = tiles_.find(beside);
+    if (n == tiles_.end() || n->second.pictured_mean < 0) continue;
+    n->second.stale_border = n->second.stale_border || first_light || n->second.borrows;
+  }
 }
 
 bool TileSchedule::failed(TileId tile) {
@@ -179,14 +183,14 @@ std::vector<TileId> TileSchedule::pictures_due() const {
     if (s.pictured_mean < 0 || s.fresh_texels || last || s.progress.mean >= s.pictured_mean * options_.publish_growth)
       due.push_back(tile);
     else if (s.stale_border)
-      borders.push_back(tile);
+      (s.borrows ? due : borders).push_back(tile);
   }
   if (calm) due.insert(due.end(), borders.begin(), borders.end());
   std::sort(due.begin(), due.end());  // neighbours together: their light is in the cache
   return due;
 }
 
-void TileSchedule::pictured(TileId tile, float error) {
+void TileSchedule::pictured(TileId tile, float error, float lost_share) {
   const auto it = tiles_.find(tile);
   if (it == tiles_.end()) return;
   State& s = it->second;
@@ -196,6 +200,7 @@ void TileSchedule::pictured(TileId tile, float error) {
   s.recalled = false;
   s.fresh_texels = false;
   s.stale_border = false;
+  s.borrows = lost_share > kBorrows;
 }
 
 std::vector<TileId> TileSchedule::recalls_due() {

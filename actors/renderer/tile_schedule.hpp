@@ -49,9 +49,11 @@ class TileSchedule {
   bool failed(TileId tile);
 
   /// Tiles whose picture is due: their first, texels that no picture was drawn for, samples grown by publish_growth,
-  /// the end of their work; and, when no first pass waits, those whose neighbour got its first light.
+  /// the end of their work; those that borrow light from a neighbour whose samples have grown by publish_growth; and,
+  /// when no first pass waits, those whose neighbour got its first light.
   [[nodiscard]] std::vector<TileId> pictures_due() const;
-  void pictured(TileId tile, float error);
+  /// `lost_share`: as TilePicture has it.
+  void pictured(TileId tile, float error, float lost_share = 0);
 
   /// Tiles that were never pictured here, but whose light, and so perhaps whose picture, is stored. Each comes once.
   [[nodiscard]] std::vector<TileId> recalls_due();
@@ -74,10 +76,12 @@ class TileSchedule {
     bool fresh_texels = false;  // some have light that no picture has shown
     bool recalled = false;      // the last picture came from the store: what it was drawn for is not known
     bool stale_border = false;
+    bool borrows = false;  // much of the last picture's light is shared with its neighbours
     bool quarantined = false;
     int failures = 0;
     TileProgress progress;
     float pictured_mean = -1;  // samples at the last picture; -1: none
+    float told_mean = 0;       // samples when its neighbours were last told of them
     float error = -1;          // of the last picture
   };
   enum class Need { kNothing, kSurvey, kFirst, kMore };

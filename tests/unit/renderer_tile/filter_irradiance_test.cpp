@@ -146,13 +146,6 @@ TEST(IrradianceFilter, SamplesThatAreLaidOutEvenlyAreLessNoise) {
   EXPECT_NEAR(of_even / of_random, 1.0 / 16, 0.02);
 }
 
-TEST(IrradianceFilter, SaysWhatOutliersWereHeldDownBy) {
-  auto w = sampled(8, noisy, one_patch);
-  const double before = mean_smear(filtered(w), everywhere);
-  w.held_down = 0.1f;
-  EXPECT_NEAR(mean_smear(filtered(w), everywhere) - before, 0.01, 1e-5);
-}
-
 TEST(IrradianceFilter, ADarkCornerIsNotBrightenedByWhatLiesInside) {
   // Light falls towards the border; a mean over one side would show the light two texels in.
   const auto light = [](int x) { return 0.4f + 0.06f * static_cast<float>(26 - x); };

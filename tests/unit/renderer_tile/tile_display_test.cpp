@@ -129,6 +129,45 @@ TEST_F(TileDisplayTest, filter_removes_noise_and_keeps_texture_and_patch_edges) 
   EXPECT_LT(filtered, raw / 4);
 }
 
+// A room lit by a small bright spot: one sample in 300 has nearly all the light, and as chance has it one tile many.
+TEST_F(TileDisplayTest, rare_light_shows_no_tiles) {
+  world_.world.light = [](TileId id, int t, std::uint32_t s) {
+    const bool lucky = noise_of(id, t, s) < (id.index() % 3 == 1 ? 1.0f / 100 : 1.0f / 900);
+    return TexelLight{{}, glm::vec3(lucky ? 60.0f : 0.02f)};
+  };
+  for (std::uint32_t i = 0; i < 9; ++i) shade(TileId(0, i), 1);
+  const auto left = draw(TileId(0, 3)), middle = draw(middle_);
+  EXPECT_GT(middle.lost_share, 0.5f);
+  double apart = 0, across = 0, linear = 0;
+  for (int y = 0; y < kTileSize; ++y) {
+    apart += code(left, 29, y) - code(middle, 0, y);
+    across += code(left, 15, y) - code(middle, 15, y);
+    linear += code(middle, 15, y);
+  }
+  EXPECT_LT(std::abs(apart / kTileSize), 4) << "to either side of a border";
+  EXPECT_LT(across / kTileSize, -10) << "or all is alike";
+  EXPECT_GT(linear / kTileSize, 60);
+}
+
+TEST_F(TileDisplayTest, light_that_is_not_shown_yet_is_there_for_paths) {
+  world_.world.light = [this](TileId id, int t, std::uint32_t) {
+    return TexelLight{{}, glm::vec3(id == middle_ && t == 465 ? 9000.0f : 0.1f)};
+  };
+  for (std::uint32_t i = 0; i < 9; ++i) shade(TileId(0, i), 2);
+  TileDisplay display(*store_, facts_, DisplayOptions{1.0f, 384});
+  ASSERT_TRUE(display.draw(middle_, level_, TexelMask::all()));
+  const auto stored = stored_texels(*store_->read(middle_), display.filtered());
+  double shown = 0, all = 0;
+  for (int t = 0; t < kTileTexels; ++t) {
+    const auto& texel =
+        display.filtered()[static_cast<std::size_t>((t / kTileSize + 1) * kSlotSize + t % kTileSize + 1)];
+    shown += double{texel.irradiance[1]};
+    all += double{stored[static_cast<std::size_t>(t)].soft.y};
+  }
+  EXPECT_LT(shown / kTileTexels, 0.5) << "a lone sample at most doubles the light around it, which is 0.2";
+  EXPECT_GT(all / kTileTexels, 4) << "of 20, what the middle of three tiles has";
+}
+
 TEST_F(TileDisplayTest, texels_inside_other_geometry_do_not_darken_those_beside_them) {
   world_.world.patch = [](TileId, int, int y) { return y < 20 ? 1u : 2u; };
   world_.world.light = [](TileId id, int t,

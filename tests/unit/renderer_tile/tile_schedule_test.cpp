@@ -188,6 +188,23 @@ TEST_F(TileScheduleTest, neighbours_first_light_renews_the_border_when_all_is_ca
   EXPECT_EQ(publish(0.001f), (std::vector<std::uint32_t>{1, 9}));
 }
 
+TEST_F(TileScheduleTest, a_picture_that_shares_rare_light_follows_the_samples_of_its_neighbours) {
+  schedule.replace({request(1, 0.5f), request(2, 0.5f), request(9, 0.01f)}, nothing_stored);
+  const auto lit = [&](std::uint32_t tile, float samples) { schedule.shaded(TileId(0, tile), at(samples), 10); };
+  lit(1, 4);
+  lit(2, 1);
+  schedule.pictured(TileId(0, 1), 0.1f, 0.5f);
+  schedule.pictured(TileId(0, 2), 0.1f, 0.0f);
+  lit(2, 1.5f);
+  EXPECT_TRUE(schedule.pictures_due().empty());
+  lit(2, 2);
+  lit(1, 7.9f);
+  EXPECT_EQ(publish(), (std::vector<std::uint32_t>{1, 2})) << "1 by its neighbour's, 2 by its own";
+  lit(1, 16);
+  lit(2, 3.9f);
+  EXPECT_EQ(publish(), std::vector<std::uint32_t>{1}) << "what shares nothing waits for its own";
+}
+
 TEST_F(TileScheduleTest, border_tiles_are_shaded_but_have_no_picture) {
   schedule.replace({request(1, 0.1f), request(2, 0.1f, false)}, nothing_stored);
   run(1000);
