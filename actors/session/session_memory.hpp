@@ -32,6 +32,14 @@ class SessionMemory {
     return now <= most_ && bytes <= most_ - now;
   }
 
+  /// Private layers, which a client can do without, leave a quarter to what waits to be sent: or the last of them would
+  /// turn away whoever comes next.
+  [[nodiscard]] bool has_room_for_layer(std::size_t bytes) const {
+    const std::size_t most = most_ - most_ / 4;
+    const auto now = held();
+    return now <= most && bytes <= most - now;
+  }
+
   /// What one session holds; nothing any more when it is destroyed.
   class Share {
    public:
@@ -45,6 +53,9 @@ class SessionMemory {
       mine_ = bytes;
     }
     [[nodiscard]] bool has_room(std::size_t bytes) const { return of_ == nullptr || of_->has_room(bytes); }
+    [[nodiscard]] bool has_room_for_layer(std::size_t bytes) const {
+      return of_ == nullptr || of_->has_room_for_layer(bytes);
+    }
 
    private:
     std::shared_ptr<SessionMemory> of_;

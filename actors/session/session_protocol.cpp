@@ -163,7 +163,7 @@ void SessionProtocol::on_hello(const wire::Hello& hello, Microseconds now, Actio
     }
   }
   // The shared light needs no memory of its own; what depends on the eye does.
-  if (format->view_phystex > 0 && !memory_.has_room(private_layer_bytes(format->view_phystex))) {
+  if (format->view_phystex > 0 && !memory_.has_room_for_layer(private_layer_bytes(format->view_phystex))) {
     format->view_phystex = 0;
     actions.push_back(Noted{"no_memory_for_layer"});
   }

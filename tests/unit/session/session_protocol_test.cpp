@@ -445,7 +445,7 @@ TEST_F(SessionProtocolTest, the_scheduler_hears_when_the_link_is_full_and_when_i
 TEST_F(SessionProtocolTest, a_client_has_no_private_layer_where_there_is_no_memory_for_one) {
   SessionPolicy policy;
   policy.view_phystex = 1024;
-  policy.memory = std::make_shared<SessionMemory>(private_layer_bytes(1024) + (4u << 20));
+  policy.memory = std::make_shared<SessionMemory>(private_layer_bytes(1024) / 3 * 4 + (4u << 20));
   const auto offered = [&](const SessionPolicy& p, Actions* actions) {
     start(p);
     auto e = hello();
