@@ -27,6 +27,7 @@ class AddressPlaces {
       return *this;
     }
     ~Place();
+    [[nodiscard]] const std::string& address() const { return address_; }
 
    private:
     std::shared_ptr<State> state_;

@@ -81,7 +81,7 @@ void SessionActor::act(Actions&& actions) {
             if (!opened_) {
               protocol_->close(wire::Goodbye::SERVER_FULL, "The server is too busy for one more client.", now_us());
             } else {
-              around_->log(id_, "opened: " + protocol_->client_name());
+              around_->log(id_, "opened: " + protocol_->client_name() + (place_ ? ", from " + place_->address() : ""));
             }
           } else {
             around_->scheduler.tell(a);
@@ -163,7 +163,10 @@ void SessionActor::finish(const std::string& why) {
   around_->datagrams->remove(id_);
   connection_->close();
   if (opened_) tell_closed(executor(), around_->scheduler, id_);
-  around_->log(id_, "closed: " + why);
+  const auto& reason = protocol_->end_reason();
+  around_->metrics->count("darm_sessions_closed_total", 1, {{"reason", reason.empty() ? "connection_lost" : reason}});
+  // Of who came and went without a word the counter is enough: there may be thousands.
+  if (opened_ || !reason.empty()) around_->log(id_, "closed: " + why);
   system().stop(self());
 }
 

@@ -94,6 +94,7 @@ void SessionProtocol::on_envelope(const wire::Envelope& envelope, Microseconds n
   if (body == Body::kGoodbye) {
     state_ = State::kClosed;
     end_ = "the client left";
+    end_reason_ = "left";
     queue_.clear();
     return;
   }
@@ -367,7 +368,8 @@ void SessionProtocol::close(wire::Goodbye::Reason reason, std::string text, Micr
   state_ = State::kClosing;
   closing_since_ = now;
   text.resize(std::min(text.size(), proto::kMaxGoodbyeText));
-  end_ = wire::Goodbye::Reason_Name(reason) + ": " + text;
+  end_reason_ = wire::Goodbye::Reason_Name(reason);
+  end_ = end_reason_ + ": " + text;
   queue_.clear();
   wire::Envelope envelope;
   envelope.mutable_goodbye()->set_reason(reason);

@@ -88,6 +88,8 @@ class SessionProtocol {
   [[nodiscard]] bool finished(Microseconds now) const;
   /// The reason and sentence of the end, for the log; empty while it goes on.
   [[nodiscard]] const std::string& end() const { return end_; }
+  /// A word for that, for metrics: "left", or the goodbye's reason as TOO_SLOW; empty while it goes on.
+  [[nodiscard]] const std::string& end_reason() const { return end_reason_; }
   [[nodiscard]] bool open() const { return state_ == State::kOpen; }
   [[nodiscard]] const std::string& client_name() const { return client_name_; }
 
@@ -132,6 +134,7 @@ class SessionProtocol {
   unsigned faults_ = 0;
   std::uint32_t coarse_version_ = 0;
   std::string end_;
+  std::string end_reason_;
   std::string client_name_;
 };
 

@@ -56,16 +56,16 @@ class Greeting : public std::enable_shared_from_this<Greeting> {
     lowest().close(ignored);
   }
   // What was waited for will not come. Closing ends the other wait too, which finds nothing left to lose.
-  void lose() {
+  void lose(const char* silent = "said_nothing") {
     if (!lowest().is_open()) return;
     close();
-    greeter_.lost(hears_ ? "handshake_failed" : "said_nothing");
+    greeter_.lost(hears_ ? "handshake_failed" : silent);
   }
 
   void look(error_code ec) {
     std::uint8_t first = 0;
     if (ec || !lowest().is_open() || ::recv(lowest().native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1)
-      return lose();
+      return lose("left_at_once");
     if (first != kTlsHandshake) return finish(make_connection(std::move(lowest())));
     hears_ = true;
     stream_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](error_code failed) {

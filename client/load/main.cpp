@@ -52,7 +52,8 @@ bool complain(const LoadReport& report) {
         " clients were not welcomed or were cut off");
   if (!report.all_ready) say("not every client had its first frame before counting began");
   if (report.disconnects.contains("SERVER_FULL"))
-    say("the server takes no more clients: raise [session] max_sessions in its configuration");
+    say("the server takes no more clients: raise max_sessions, max_sessions_per_address or max_memory_bytes under "
+        "[session] in its configuration (darm_session_events_total says which)");
   if (report.all.faults.total() > 0) say(std::to_string(report.all.faults.total()) + " faults in what the server sent");
   return good;
 }

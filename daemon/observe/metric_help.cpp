@@ -54,6 +54,8 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_session_memory_bytes",
      "What waits to be sent and private layers, of all sessions, against max_memory_bytes"},
     {"darm_session_pictures_dropped_total", "Pictures not sent to a client, by reason"},
+    {"darm_sessions_closed_total",
+     "Sessions that have ended, by reason: left, connection_lost, or the server's goodbye"},
     {"darm_sessions_set_apart_total", "Sessions that did not keep up and went to a stream of such sessions"},
     {"darm_sessions_slow", "Sessions on streams of those that do not keep up, now"},
     {"darm_sessions_taken_back_total", "Sessions that kept up again and came back"},

@@ -261,6 +261,14 @@ void PrometheusSink::set(std::string_view name, double value, runtime::Labels la
 
 Health::Health(runtime::MetricSink& sink, std::string_view version) : sink_(sink) {
   sink_.set("darm_build_info", 1, {{"version", version}});
+  // What alerts watch is there from the start: of a series that begins with its first event there is no increase.
+  for (const char* what : {"server_full", "address_full", "memory_full", "accept_failed"})
+    sink_.count("darm_session_events_total", 0, {{"what", what}});
+  for (const char* reason : {"TOO_SLOW", "TIMED_OUT", "PROTOCOL_ERROR", "VERSION_UNSUPPORTED", "FORMAT_REFUSED"})
+    sink_.count("darm_sessions_closed_total", 0, {{"reason", reason}});
+  sink_.count("darm_renderer_quarantined_samples_total", 0);
+  sink_.count("darm_encoder_failures_total", 0);
+  sink_.count("darm_encoder_frames_refused_total", 0);
   set_ready(false);
 }
 

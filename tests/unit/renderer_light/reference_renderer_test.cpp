@@ -194,5 +194,30 @@ TEST(Exposure, is_pi_over_the_irradiance_of_an_evenly_lit_scene_and_one_in_the_d
   EXPECT_EQ(scene_exposure(dark, 256), 1.0f);
 }
 
+// A white room of 4 m, a lamp of 10 cm facing up 10 cm under its ceiling: 8 samples of a point find the spot seldom.
+TEST(Exposure, of_a_room_lit_over_a_small_bright_spot_is_that_of_its_walls) {
+  HandScene hand;
+  const auto white = hand.material(HandScene::matte(glm::vec3(0.8f)));
+  hand.quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}, white);  // floor
+  hand.quad({-2, 3, -2}, {4, 0, 0}, {0, 0, 4}, white);  // ceiling
+  hand.quad({-2, 0, -2}, {4, 0, 0}, {0, 3, 0}, white);  // walls, which face inwards
+  hand.quad({2, 0, 2}, {-4, 0, 0}, {0, 3, 0}, white);
+  hand.quad({-2, 0, 2}, {0, 0, -4}, {0, 3, 0}, white);
+  hand.quad({2, 0, -2}, {0, 0, 4}, {0, 3, 0}, white);
+  hand.quad({-0.05f, 2.9f, 0.05f}, {0.1f, 0, 0}, {0, 0, -0.1f},
+            hand.material(HandScene::matte(glm::vec3(0), glm::vec3(2000))));
+  const auto scene = hand.share();
+  const LightTransport lit(scene, trace::RayScene::build(scene, 1).value());
+  double floor = 0;
+  constexpr std::uint32_t kSamples = 20'000;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    Sampler sampler(7, i % 100, i / 100);
+    floor += double{luminance(lit.irradiance({0, 0, sampler.next_1d(), 0, true}, sampler).sum())};
+  }
+  const double of_floor = kPi * kSamples / floor;
+  EXPECT_GT(scene_exposure(lit) / of_floor, 0.3);
+  EXPECT_LT(scene_exposure(lit) / of_floor, 2);
+}
+
 }  // namespace
 }  // namespace darm::renderer
