@@ -15,6 +15,7 @@
 #include "actors/session/udp_listener.hpp"
 #include "actors/session/web_listener.hpp"
 #include "daemon/effect_metrics.hpp"
+#include "daemon/observe/process_stats.hpp"
 #include "daemon/observe/prometheus_sink.hpp"
 #include "daemon/pipeline.hpp"
 #include "daemon/scene_setup.hpp"
@@ -162,6 +163,18 @@ Result<Addresses> Daemon::Parts::listen() {
   return addresses;
 }
 
+// Said at the start: when they run out, clients hang and nothing else tells why.
+static void warn_of_descriptors(std::uint32_t max_sessions) {
+  constexpr std::uint64_t kOthers = 64;  // listeners, files, who asks for the page and the metrics
+  const std::uint64_t wanted = 2 * std::uint64_t{max_sessions} + kOthers;
+  const std::uint64_t allowed = observe::process_stats().most_descriptors;
+  if (allowed > 0 && allowed < wanted)
+    spdlog::warn(
+        "{} file descriptors are allowed, and {} clients (session.max_sessions) may need {}: raise them (ulimit -n, "
+        "LimitNOFILE=), or allow fewer clients",
+        allowed, max_sessions, wanted);
+}
+
 Result<Addresses> Daemon::start(const std::function<void(const std::string&)>& on_fatal) {
   auto& parts = *parts_;
   parts.health.emplace(parts.metrics, "0.1.0");
@@ -184,6 +197,7 @@ Result<Addresses> Daemon::start(const std::function<void(const std::string&)>& o
   parts.fill_supervision(on_fatal);
   parts.pipeline =
       spawn_pipeline(*parts.system, parts.world, parts.config, {parts.seed, parts.sessions, &parts.metrics, {}});
+  warn_of_descriptors(parts.config.session.max_sessions);
   auto addresses = parts.listen();
   if (addresses) parts.health->set_ready(true);
   return addresses;

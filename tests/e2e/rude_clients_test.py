@@ -1,6 +1,7 @@
 """Clients that keep to the protocol's letter and ask for all they can: the others go on, and the daemon stops in time."""
 import math
 import re
+import resource
 import signal
 import socket
 import struct
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from running import SOURCE, Daemon, Folder, probe, wait_until
 
-HELLO, CAMERA, WELCOME = 1, 2, 5
+HELLO, CAMERA, GOODBYE, WELCOME = 1, 2, 4, 5
 VERSION = int(re.search(r"kProtocolVersion = (\d+)", (SOURCE / "proto/limits.hpp").read_text()).group(1))
 
 
@@ -123,6 +124,41 @@ class RudeClients(unittest.TestCase):
             silent.socket.settimeout(5)
             self.assertEqual(silent.socket.recv(1), b"")
             self.assertEqual(daemon.values()['darm_session_events_total{what="said_nothing"}'], 1)
+            self.assertEqual(daemon.stop(), 0)
+
+    def test_ends_are_counted_by_reason_and_what_alerts_watch_is_there_from_the_start(self):
+        with Folder() as folder:
+            daemon = Daemon(Path(folder) / "state")
+            self.addCleanup(daemon.process.kill)
+            before = daemon.values()
+            for series in ('darm_session_events_total{what="server_full"}', 'darm_sessions_closed_total{reason="TOO_SLOW"}',
+                           'darm_sessions_closed_total{reason="VERSION_UNSUPPORTED"}', "darm_encoder_failures_total"):
+                self.assertEqual(before[series], 0)
+            old, leaving, gone = Client(daemon.tcp), Client(daemon.tcp), Client(daemon.tcp)
+            old.send(HELLO, field(1, VERSION - 1) + field(2, b"old") + field(4, 2048))
+            leaving.enter().send(GOODBYE, b"")
+            gone.enter().socket.shutdown(socket.SHUT_RDWR)
+            silent = socket.create_connection(("127.0.0.1", daemon.tcp))
+            silent.close()
+
+            def counted(name):
+                return daemon.values().get(name, 0)
+
+            for reason in ("VERSION_UNSUPPORTED", "left", "connection_lost"):
+                wait_until(lambda: counted('darm_sessions_closed_total{reason="%s"}' % reason) == 1, 5, reason)
+            wait_until(lambda: counted('darm_session_events_total{what="left_at_once"}') == 1, 5, "left_at_once")
+            self.assertEqual(daemon.stop(), 0)
+
+    def test_too_few_descriptors_are_told_at_the_start(self):
+        with Folder() as folder:
+            allowed = resource.getrlimit(resource.RLIMIT_NOFILE)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (150, allowed[1]))
+            try:
+                daemon = Daemon(Path(folder) / "state")
+            finally:
+                resource.setrlimit(resource.RLIMIT_NOFILE, allowed)
+            self.addCleanup(daemon.process.kill)
+            self.assertIn("150 file descriptors are allowed, and 64 clients", daemon.messages())
             self.assertEqual(daemon.stop(), 0)
 
     def test_who_connects_to_the_metrics_and_says_nothing_does_not_hold_up_the_stop(self):
