@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "actors/types/tile_id.hpp"
-
 namespace darm::renderer {
 
 /// Samples from which a texel is left as it is.

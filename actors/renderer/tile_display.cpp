@@ -102,21 +102,25 @@ bool TileDisplay::wants_filter(const TexelMask& mask) const {
 }
 
 // The nine tiles, as they were measured.
-void TileDisplay::find_lost() {
+void TileDisplay::gather_nine() {
   square_.reset(3 * kTileSize);
   for (int tile = 0; tile < 9; ++tile) {
     const auto& from = around_[static_cast<std::size_t>(tile)];
-    if (!from.facts || !from.light) continue;
+    if (!from.facts) continue;
     for (int t = 0; t < kTileTexels; ++t) {
-      const float n = from.light->count(Layer::kSoft, t);
       const auto at = static_cast<std::size_t>((tile / 3 * kTileSize + t / kTileSize) * square_.size +
                                                tile % 3 * kTileSize + t % kTileSize);
       square_.patch[at] = from.facts->patch[static_cast<std::size_t>(t)];
-      if (n <= 0 || square_.patch[at] == kNobody || from.light->lightless(t)) continue;
+      if (!from.light || square_.patch[at] == kNobody) continue;
+      const float n = from.light->count(Layer::kSoft, t);
+      if (n <= 0 || from.light->lightless(t)) continue;
       square_.count[at] = n;
       square_.grey[at] = luminance(from.light->mean(Layer::kSoft, t));
     }
   }
+}
+
+void TileDisplay::find_lost() {
   find_outliers(square_, outliers_);
   lost_.clear();
   for (const Outlier& outlier : outliers_) {
@@ -133,7 +137,7 @@ void TileDisplay::find_lost() {
 
 // In the window as it was measured.
 void TileDisplay::tame() {
-  const int margin = kTileSize - 1 - window_.radius;  // of the nine tiles, around the window
+  const int margin = margin_of_window();
   for (const Outlier& outlier : outliers_) {
     const int x = static_cast<int>(outlier.at) % square_.size - margin;
     const int y = static_cast<int>(outlier.at) / square_.size - margin;
@@ -167,30 +171,33 @@ void TileDisplay::share_out() {
   lost_share_ = shown > 0 ? static_cast<float>(lost / shown) : 0.0f;
 }
 
+// Around the window, of the nine tiles.
+int TileDisplay::margin_of_window() const { return kTileSize - 1 - window_.radius; }
+
 void TileDisplay::gather() {
   window_.reset(kMaxFilterRadius);
+  const int margin = margin_of_window();
   for (int y = 0; y < window_.size; ++y) {
     const Step row = step_of(y - window_.radius - 1);
     for (int x = 0; x < window_.size; ++x) {
       const Step column = step_of(x - window_.radius - 1);
       const auto& from = around_[static_cast<std::size_t>(row.tile * 3 + column.tile)];
       const auto at = static_cast<std::size_t>(y * window_.size + x);
+      const auto of_nine = static_cast<std::size_t>((y + margin) * square_.size + x + margin);
       const int texel = row.texel * kTileSize + column.texel;
-      if (!from.facts) continue;
-      window_.patch[at] = from.facts->patch[static_cast<std::size_t>(texel)];
-      if (!from.light || window_.patch[at] == kNobody) continue;
+      window_.patch[at] = square_.patch[of_nine];
+      if (!from.facts || !from.light || window_.patch[at] == kNobody) continue;
       if (from.facts->knows_albedo(texel) && from.light->count(Layer::kSharp, texel) > 0) {
         const glm::vec3 albedo = from.facts->albedo(texel);
         window_.tint[at] = options_.exposure * luminance(albedo);
         window_.floor[at] = options_.exposure *
                             luminance(from.light->mean(Layer::kSharp, texel) * albedo + from.facts->emission(texel));
       }
-      const float n = from.light->count(Layer::kSoft, texel);
-      if (n <= 0 || from.light->lightless(texel)) continue;
+      if (square_.count[of_nine] <= 0) continue;
       const glm::vec3 soft = from.light->mean(Layer::kSoft, texel);
-      window_.count[at] = n;
+      window_.count[at] = square_.count[of_nine];
       for (int c = 0; c < 3; ++c) window_.irradiance[static_cast<std::size_t>(c)][at] = soft[c];
-      window_.grey[at] = luminance(soft);
+      window_.grey[at] = square_.grey[of_nine];
       window_.grey_m2[at] = from.light->plane(Plane::kSoftM2)[texel];
     }
   }
@@ -311,6 +318,7 @@ float TileDisplay::error_of(const TexelMask& mask, const SlotColours& colours,
 std::optional<TilePicture> TileDisplay::draw(TileId id, const LevelTiles& level, const TexelMask& mask, Unlit unlit) {
   look_around(id, level);
   if (wants_filter(mask)) {
+    gather_nine();
     find_lost();
     gather();
     tame();

@@ -67,7 +67,9 @@ class TileDisplay {
   };
   void look_around(TileId id, const LevelTiles& level);
   [[nodiscard]] bool wants_filter(const TexelMask& mask) const;
+  void gather_nine();
   void find_lost();
+  [[nodiscard]] int margin_of_window() const;
   void gather();
   void tame();
   void share_out();
