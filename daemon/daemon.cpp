@@ -48,6 +48,18 @@ session::SessionPolicy session_policy(const config::Config& config, const World&
   return policy;
 }
 
+// Said at the start: when they run out, clients hang and nothing else tells why.
+void warn_of_descriptors(std::uint32_t max_sessions) {
+  constexpr std::uint64_t kOthers = 64;  // listeners, files, who asks for the page and the metrics
+  const std::uint64_t wanted = 2 * std::uint64_t{max_sessions} + kOthers;
+  const std::uint64_t allowed = observe::process_stats().most_descriptors;
+  if (allowed > 0 && allowed < wanted)
+    spdlog::warn(
+        "{} file descriptors are allowed, and {} clients (session.max_sessions) may need {}: raise them (ulimit -n, "
+        "LimitNOFILE=), or allow fewer clients",
+        allowed, max_sessions, wanted);
+}
+
 }  // namespace
 
 struct Daemon::Parts {
@@ -161,18 +173,6 @@ Result<Addresses> Daemon::Parts::listen() {
   io_work.emplace(io.get_executor());
   io_thread = std::thread([this] { io.run(); });
   return addresses;
-}
-
-// Said at the start: when they run out, clients hang and nothing else tells why.
-static void warn_of_descriptors(std::uint32_t max_sessions) {
-  constexpr std::uint64_t kOthers = 64;  // listeners, files, who asks for the page and the metrics
-  const std::uint64_t wanted = 2 * std::uint64_t{max_sessions} + kOthers;
-  const std::uint64_t allowed = observe::process_stats().most_descriptors;
-  if (allowed > 0 && allowed < wanted)
-    spdlog::warn(
-        "{} file descriptors are allowed, and {} clients (session.max_sessions) may need {}: raise them (ulimit -n, "
-        "LimitNOFILE=), or allow fewer clients",
-        allowed, max_sessions, wanted);
 }
 
 Result<Addresses> Daemon::start(const std::function<void(const std::string&)>& on_fatal) {

@@ -20,8 +20,7 @@ struct Greeter {
 /// A TLS client begins with byte 0x16; ours without TLS with the length of a small message, whose first byte is 0.
 /// Waits ten seconds at most; a client that says nothing, goes before it has, or whose handshake fails is closed, and
 /// instead of `ready` one of the events "said_nothing", "left_at_once" and "handshake_failed" is counted, unless the
-/// server stops. `socket` must have a
-/// strand, and comes from `peer`. Too many are greeted: it is closed, "tcp_crowded".
+/// server stops. `socket` must have a strand, and comes from `peer`. Too many are greeted: it is closed, "tcp_crowded".
 void greet(boost::asio::ip::tcp::socket socket, const std::shared_ptr<boost::asio::ssl::context>& tls,
            PendingSockets& pending, const std::string& peer, Greeter greeter);
 
