@@ -448,6 +448,12 @@ void RadianceStore::Update::merge(int texel, Layer layer, const TexelBatch& batc
       std::min(1e38, p[4 * kTileTexels] + batch.luminance_m2 + delta * delta * before * added / all));
 }
 
+void RadianceStore::Update::forget(int texel, Layer layer) {
+  if (texel < 0 || texel >= kTileTexels) return;
+  float* p = store_->block(block_)->content.planes + static_cast<int>(layer) * kTileTexels + texel;
+  for (int plane = 0; plane < kPlanes / 2; ++plane) p[plane * kTileTexels] = 0;
+}
+
 RadianceStore::Update::~Update() {
   if (store_ == nullptr) return;
   BlockHeader* b = store_->block(block_);

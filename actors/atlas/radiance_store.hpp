@@ -144,6 +144,8 @@ class RadianceStore {
     /// Merges a batch into a texel's running mean and second moment (Chan, Golub, LeVeque 1979, eq. 2.1; pairs of any
     /// order give the same up to rounding). Refuses nothing: batches hold only finite samples.
     void merge(int texel, Layer layer, const TexelBatch& batch);
+    /// As if the texel had never had a sample of that layer.
+    void forget(int texel, Layer layer);
     void put_albedo(const TileAlbedo& albedo);
     [[nodiscard]] TileView view() const;
 

@@ -4,23 +4,44 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 namespace darm::renderer {
 
+namespace {
+
+constexpr std::uint32_t kHurriedPasses = 16;  // of a job: a tile full of texels is some tens of milliseconds
+
+// One job a tile: a tile has one writer.
+std::vector<CoarseRequest> by_tile(std::span<const CoarseRequest> texels, const LevelTiles& tiles) {
+  std::vector<CoarseRequest> out(texels.begin(), texels.end());
+  std::erase_if(out, [&](const CoarseRequest& r) { return r.tile >= tiles.x * tiles.y; });
+  std::ranges::stable_sort(out, {}, &CoarseRequest::tile);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (kept > 0 && out[kept - 1].tile == out[i].tile)
+      out[kept - 1].mask |= out[i].mask;
+    else
+      out[kept++] = out[i];
+  }
+  out.resize(kept);
+  return out;
+}
+
+}  // namespace
+
 void CoarseRounds::prefer(std::span<const CoarseRequest> seen) {
   if (!opening()) return;
-  preferred_.assign(seen.begin(), seen.end());
-  std::erase_if(preferred_, [&](const CoarseRequest& r) { return r.tile >= tiles_.x * tiles_.y; });
-  std::stable_sort(preferred_.begin(), preferred_.end(), [](const auto& a, const auto& b) { return a.tile < b.tile; });
-  std::size_t kept = 0;  // one job a tile: a tile has one writer
-  for (const auto& request : std::vector<CoarseRequest>(preferred_)) {
-    if (kept > 0 && preferred_[kept - 1].tile == request.tile)
-      preferred_[kept - 1].mask |= request.mask;
-    else
-      preferred_[kept++] = request;
-  }
-  preferred_.resize(kept);
+  preferred_ = by_tile(seen, tiles_);
   preferred_cursor_ = 0;  // what was done is done: shading it again takes no samples
+}
+
+void CoarseRounds::hurry(std::span<const CoarseRequest> texels, std::uint32_t samples) {
+  hurried_ = by_tile(texels, tiles_);
+  hurried_cursor_ = 0;
+  hurried_samples_ = samples;
+  hurried_step_ = 1;
+  hurried_due_ = hurries();
 }
 
 TileJob CoarseRounds::job_for(std::uint32_t tile, const TexelMask& mask) const {
@@ -34,11 +55,31 @@ TileJob CoarseRounds::job_for(std::uint32_t tile, const TexelMask& mask) const {
   return job;
 }
 
+void CoarseRounds::next_hurried() {
+  if (++hurried_cursor_ < hurried_.size() || hurried_step_ >= hurried_samples_) return;
+  hurried_cursor_ = 0;
+  hurried_step_ =
+      std::min(hurried_step_ < kHurriedPasses ? kHurriedPasses : hurried_step_ + kHurriedPasses, hurried_samples_);
+}
+
 std::vector<TileJob> CoarseRounds::next_batch(std::uint64_t samples) {
   std::vector<TileJob> jobs;
-  if (finished()) return jobs;
   std::uint64_t taken = 0;
-  if (opening() && preferred_cursor_ < preferred_.size()) {
+  if (hurries()) {
+    const std::uint32_t step = hurried_step_;  // a tile comes once in a batch
+    while (hurries() && hurried_step_ == step && taken < samples) {
+      jobs.push_back(job_for(hurried_[hurried_cursor_].tile, hurried_[hurried_cursor_].mask));
+      TileJob& job = jobs.back();
+      job.passes = std::min(step, kHurriedPasses);
+      job.most = step;
+      job.cost *= job.passes;
+      job.hurried = true;
+      taken += job.cost;
+      next_hurried();
+    }
+    return jobs;
+  }
+  if (preferring()) {
     for (; preferred_cursor_ < preferred_.size() && taken < samples; ++preferred_cursor_) {
       const auto& wanted = preferred_[preferred_cursor_];
       jobs.push_back(job_for(wanted.tile, wanted.mask));
@@ -46,6 +87,7 @@ std::vector<TileJob> CoarseRounds::next_batch(std::uint64_t samples) {
     }
     return jobs;
   }
+  if (finished()) return jobs;
   for (; cursor_ < tiles_.x * tiles_.y && taken < samples; ++cursor_) {
     jobs.push_back(job_for(cursor_, TexelMask::all()));
     taken += jobs.back().cost;
@@ -53,16 +95,18 @@ std::vector<TileJob> CoarseRounds::next_batch(std::uint64_t samples) {
   return jobs;
 }
 
-bool CoarseRounds::batch_finished() {
-  if (finished()) return false;
-  if (opening() && !preferred_.empty() && preferred_cursor_ == preferred_.size()) {
+CoarseDue CoarseRounds::batch_finished() {
+  if (hurries()) return CoarseDue::kNothing;
+  if (std::exchange(hurried_due_, false)) return CoarseDue::kLight;
+  if (finished() || preferring()) return CoarseDue::kNothing;
+  if (opening() && !preferred_.empty()) {
     opened_ = true;
-    return true;
+    return CoarseDue::kPicture;
   }
-  if (cursor_ < tiles_.x * tiles_.y) return false;
+  if (cursor_ < tiles_.x * tiles_.y) return CoarseDue::kNothing;
   const std::uint32_t done = round_++;
   cursor_ = 0;
-  return done == 0 || std::has_single_bit(done) || done == rounds_;
+  return done == 0 || std::has_single_bit(done) || done == rounds_ ? CoarseDue::kPicture : CoarseDue::kNothing;
 }
 
 CoarseCanvas::CoarseCanvas(LevelTiles tiles, std::uint32_t version)

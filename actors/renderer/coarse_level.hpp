@@ -20,8 +20,15 @@ struct CoarsePicture {
   std::vector<std::uint8_t> rgb;
 };
 
+enum class CoarseDue : std::uint8_t {
+  kNothing,
+  kLight,    ///< for paths to end in
+  kPicture,  ///< and that
+};
+
 /// Round 0 is every tile's first pass (see shade_tile), round r then brings every texel to r samples. A picture is due
-/// after the tiles that a view asked for, and after rounds 0, 1, 2, 4, 8, ... and the last.
+/// after the tiles that a view asked for, and after rounds 0, 1, 2, 4, 8, ... and the last. Texels that much of the
+/// scene's light comes from may be brought on ahead of the rounds; light is due after these.
 class CoarseRounds {
  public:
   /// `rounds` 0: the coarse level is left alone.
@@ -32,8 +39,15 @@ class CoarseRounds {
   [[nodiscard]] bool opening() const { return round_ == 0 && !opened_ && !finished(); }
   /// What somebody sees now: while the first picture is not there, it comes first and is enough for one.
   void prefer(std::span<const CoarseRequest> seen);
+  /// These are brought to `samples` before anything else.
+  void hurry(std::span<const CoarseRequest> texels, std::uint32_t samples);
+  [[nodiscard]] bool hurries() const { return hurried_cursor_ < hurried_.size(); }
+  /// Those, one request a tile, until the next call of hurry().
+  [[nodiscard]] std::span<const CoarseRequest> hurried() const { return hurried_; }
   /// Every texel has two samples.
   [[nodiscard]] bool even() const { return round_ > 2; }
+  /// That which is under way.
+  [[nodiscard]] std::uint32_t round() const { return round_; }
   [[nodiscard]] int level() const { return level_; }
   [[nodiscard]] const LevelTiles& tiles() const { return tiles_; }
 
@@ -45,11 +59,13 @@ class CoarseRounds {
     opened_ = true;
     if (samples > 0) round_ = std::min(samples, rounds_) + 1;
   }
-  /// Call when all jobs handed out are done. True if a picture is due now.
-  bool batch_finished();
+  /// Call when all jobs handed out are done: what is due now.
+  CoarseDue batch_finished();
 
  private:
   [[nodiscard]] TileJob job_for(std::uint32_t tile, const TexelMask& mask) const;
+  void next_hurried();
+  [[nodiscard]] bool preferring() const { return opening() && preferred_cursor_ < preferred_.size(); }
 
   int level_;
   LevelTiles tiles_;
@@ -58,6 +74,11 @@ class CoarseRounds {
   std::uint32_t cursor_ = 0;
   std::vector<CoarseRequest> preferred_;
   std::size_t preferred_cursor_ = 0;
+  std::vector<CoarseRequest> hurried_;
+  std::size_t hurried_cursor_ = 0;
+  std::uint32_t hurried_samples_ = 0;
+  std::uint32_t hurried_step_ = 0;  // how many they have after this time around; the first is a first pass
+  bool hurried_due_ = false;
   bool opened_ = false;  // the preferred texels are done
 };
 

@@ -34,6 +34,7 @@ struct Path {
   bool camera = false;     // sees through the backs of single-sided triangles
   bool suns_done = false;  // the vertex before took its suns by shadow rays alone
   const StoredLight* stored = nullptr;
+  const BrightTexels::Aim* aim = nullptr;  // a point of bright texels may have been drawn, too, where it comes from
   bool sharp_seen = false;  // what it meets is seen in a mirror: sharp light is taken there, not from coarse texels
 
   // The light that is stored was made with normals bent: a path that ends in it need not look at them.
@@ -50,7 +51,7 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
   using Path = detail::Path;
   using DirectLight<fx>::scene_, DirectLight<fx>::rays_, DirectLight<fx>::lights_, DirectLight<fx>::options;
   using DirectLight<fx>::surface_at, DirectLight<fx>::material_at;
-  using DirectLight<fx>::suns_at, DirectLight<fx>::lamps_at, DirectLight<fx>::emitters_at;
+  using DirectLight<fx>::suns_at, DirectLight<fx>::lamps_at, DirectLight<fx>::emitters_at, DirectLight<fx>::visibility;
 
  public:
   explicit PathIntegrator(std::shared_ptr<const TransportWorld> world) : DirectLight<fx>(std::move(world)) {}
@@ -196,6 +197,8 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
     const glm::vec3 wi = glm::normalize(t * d.x + b * d.y + s.normal * d.z);
     Path path;
     const glm::vec3 weight = scatter.evaluate(wi, path.pdf);
+    BrightTexels::Aim aim;
+    soft += bright_at(s, scatter, stored, aim, walk);
     if (path.pdf > 0) {
       path.throughput = weight / path.pdf;
       path.ray = {trace::spawn_origin(s, wi), 0.0f, wi, 1e30f};
@@ -203,9 +206,51 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
       path.bounce = 1;
       path.suns_done = true;
       path.stored = stored;
+      path.aim = &aim;
       soft += trace_path(path, walk);
     }
     return detail::finite_or_black(soft);
+  }
+
+  /// A point of a bright texel, against directions that find it by chance: those know of it by `aim`, which is set.
+  template <class Scatter>
+  [[nodiscard]] glm::vec3 bright_at(const trace::Surface& s, const Scatter& scatter, const StoredLight* known_light,
+                                    BrightTexels::Aim& aim, Walk& walk) const {
+    if (known_light == nullptr || known_light->bright().empty()) return glm::vec3(0.0f);
+    const StoredLight& stored = *known_light;
+    const StoredTexel* here = stored.find(s, glm::vec2(0.5f));
+    aim = stored.bright().aim(s.position, scatter.normal(), here != nullptr ? luminance(here->soft) : -1.0f);
+    const float chance = walk.sampler.next_1d();
+    const float pick = walk.sampler.next_1d();
+    const glm::vec2 place = walk.sampler.next_2d();
+    const glm::vec2 corner = walk.sampler.next_2d();
+    if (!(chance < aim.chance)) return glm::vec3(0.0f);
+    const auto drawn = stored.bright().draw(aim, pick, place);
+    if (!drawn) return glm::vec3(0.0f);
+    trace::Surface to;
+    MaterialPoint m;
+    look_at({0, drawn->instance, drawn->triangle, drawn->u, drawn->v, drawn->front}, false, to, m, walk);
+    const glm::vec3 way = to.position - s.position;
+    const float square = glm::dot(way, way);
+    if (!ends_at(to, m, square, stored)) return glm::vec3(0.0f);
+    const glm::vec3 wi = way * (1.0f / std::sqrt(square));
+    float pdf = 0;
+    const glm::vec3 f = scatter.evaluate(wi, pdf);
+    const float light_pdf = aimed_pdf(aim, stored, to, wi, square);
+    const StoredTexel* known = stored.find(to, corner);
+    if (!(pdf > 0) || !(light_pdf > 0) || known == nullptr) return glm::vec3(0.0f);
+    const glm::vec3 light = diffuse_share(m, to, wi) * (known->sharp + known->soft);
+    if (detail::largest(light) <= 0) return glm::vec3(0.0f);
+    return f * light * visibility(s, way, &to.position, walk) * (mis_weight(light_pdf, pdf) / light_pdf);
+  }
+
+  /// Density per steradian, times its chance, with which bright_at() draws `to`, which is `square` away (squared).
+  [[nodiscard]] static float aimed_pdf(const BrightTexels::Aim& aim, const StoredLight& stored,
+                                       const trace::Surface& to, const glm::vec3& direction, float square) {
+    const float cosine = -glm::dot(to.geometric_normal, direction);
+    if (!(cosine > 1e-6f)) return 0.0f;
+    const SurfacePoint point{to.instance, to.triangle, to.u, to.v, to.front};
+    return aim.chance * stored.bright().pdf_area(aim, point, to.area) * square / cosine;
   }
 
   /// What specular and transmission lobes send towards `wo`.
@@ -317,23 +362,37 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
     return m.emission * mis_weight(path.pdf, light_pdf * glm::dot(to, to) / cosine);
   }
 
-  /// Adds what is stored of the diffuse light of `s`. Surfaces that emit are left to the path: their own light is not
-  /// part of what is stored and would have to be told apart. So are those that transmit: most of them have no diffuse
-  /// light.
+  /// Surfaces that emit are left to the path: their own light is not part of what is stored and would have to be told
+  /// apart. So are those that transmit: most of them have no diffuse light. `square`: of the way there.
+  [[nodiscard]] static bool ends_at(const trace::Surface& s, const MaterialPoint& m, float square,
+                                    const StoredLight& stored) {
+    const float least = stored.least_distance();
+    return !m.unlit && !(m.transmission > 0) && !(fx.emitters && s.placed->material->emits()) &&
+           square >= least * least;
+  }
+
+  /// What the diffuse lobe of a surface that is met in `direction` sends back of irradiance / pi.
+  [[nodiscard]] static glm::vec3 diffuse_share(const MaterialPoint& m, const trace::Surface& s,
+                                               const glm::vec3& direction) {
+    const float cosine = std::max(-glm::dot(s.normal, direction), 0.0f);
+    return m.base * ((1.0f - m.metallic) * (1.0f - m.fresnel(cosine)));
+  }
+
+  /// Adds what is stored of the diffuse light of `s`, if anything is.
   [[nodiscard]] detail::AtStored end_in_stored_light(Path& path, const trace::Surface& s, const MaterialPoint& m,
                                                      Walk& walk, glm::vec3& light) const {
     const glm::vec3 way = s.position - path.from;
-    const float least = path.stored->least_distance();
-    if (m.unlit || m.transmission > 0 || (fx.emitters && s.placed->material->emits()) ||
-        glm::dot(way, way) < least * least)
-      return detail::AtStored::kUnknown;
+    const float square = glm::dot(way, way);
+    if (!ends_at(s, m, square, *path.stored)) return detail::AtStored::kUnknown;
     const StoredTexel* known = path.stored->find(s, walk.sampler.next_2d());
     if (known == nullptr) return detail::AtStored::kUnknown;
-    const float cosine = std::max(-glm::dot(s.normal, path.ray.direction), 0.0f);
-    const glm::vec3 share = m.base * ((1.0f - m.metallic) * (1.0f - m.fresnel(cosine)));
     const glm::vec3 sharp = path.sharp_seen ? sharp_diffuse(s, walk) : known->sharp;
-    light += path.throughput * share * (sharp + known->soft);
+    glm::vec3 sent = path.throughput * diffuse_share(m, s, path.ray.direction) * (sharp + known->soft);
+    if (path.aim != nullptr && path.aim->chance > 0)
+      sent *= mis_weight(path.pdf, aimed_pdf(*path.aim, *path.stored, s, path.ray.direction, square));
+    light += sent;
     if constexpr (!fx.glossy) return detail::AtStored::kEnds;
+    const float cosine = std::max(-glm::dot(s.normal, path.ray.direction), 0.0f);
     // The other lobes of most surfaces scatter a twentieth of the light: one path in twenty goes on for them.
     const float goes_on = std::min(luminance(m.reflectance(cosine)), 1.0f);
     if (!(walk.sampler.next_1d() < goes_on)) return detail::AtStored::kEnds;
@@ -345,6 +404,7 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
     glm::vec3 light(0.0f);
     trace::Surface s;
     MaterialPoint m;
+    BrightTexels::Aim aim;
     while (true) {
       if (!next_surface(path, s, m, walk)) return light + path.throughput * background(path, walk);
       if (detail::sees_black(s)) return light;
@@ -360,6 +420,8 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
       const auto scatter = scatter_at(s, m, -path.ray.direction, lobes, walk);
       light +=
           path.throughput * (suns_at(s, scatter, walk) + lamps_at(s, scatter, walk, 1) + emitters_at(s, scatter, walk));
+      const bool aims = lobes == Lobes::kAll && !path.sharp_seen;
+      if (aims) light += path.throughput * bright_at(s, scatter, path.stored, aim, walk);
       const BsdfSample next = scatter.sample(walk.sampler);
       if (!(next.pdf > 0)) return light;
       path.throughput *= next.weight;
@@ -373,6 +435,7 @@ class PathIntegrator final : public Integrator, DirectLight<fx> {
       path.ray = {trace::spawn_origin(s, next.direction), 0.0f, next.direction, 1e30f};
       path.from = s.position;
       path.pdf = next.pdf;
+      path.aim = aims ? &aim : nullptr;
       path.camera = false;
       path.suns_done = false;
     }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "actors/renderer/bright_samples.hpp"
 #include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/divided_texels.hpp"
 #include "actors/renderer/stored_light.hpp"
@@ -17,11 +18,18 @@ namespace darm::renderer {
 namespace {
 
 constexpr std::size_t kPicturesPerSlice = 8;
-constexpr float kRareLight = 0.2f;      // of what the coarse level shows
-constexpr double kPressingShare = 0.5;  // of shading
+constexpr std::uint32_t kLastRenewed = 4;  // round of the coarse level
+// Of a picture whose light is not known to be as bright as it is: a quarter of the display's range, as what is filled.
+constexpr float kUnsettledError = 0.25f;
+constexpr float kRareLight = 0.2f;            // of what the coarse level shows
+constexpr double kPressingShare = 0.5;        // of shading
+constexpr std::uint32_t kFirstOfBright = 16;  // samples of a texel that emitters shine on
+// Of the flux of bright texels: all others hear of its error, and hear it again at each bounce.
+constexpr float kFirstTolerance = 0.02f;  // for the first picture
+constexpr float kTolerance = 0.005f;
 
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
-constexpr std::uint64_t kDisplayVersion = 6;
+constexpr std::uint64_t kDisplayVersion = 7;
 
 // What a stored picture depends on beside its light.
 std::uint64_t picture_tag_of(const DisplayOptions& display) {
@@ -83,6 +91,10 @@ struct RendererActor::Batch {
   std::vector<JobResult> results;  // each written by the one slice that runs the job
   std::shared_ptr<CoarseCanvas> canvas;
   std::shared_ptr<StoredLight> light;  // of the same tiles
+  bool first = false;                  // light, before the coarse level has a picture
+  bool of_all = false;                 // of what shines, all is known: not only what is seen
+  std::vector<CoarseRequest> wanting;  // its bright texels, where those have too few samples
+  std::uint32_t wanted = 0;            // so many would do
 };
 
 RendererActor::RendererActor(runtime::Context<Inbox> context, RendererParts parts)
@@ -95,6 +107,7 @@ RendererActor::RendererActor(runtime::Context<Inbox> context, RendererParts part
 
 void RendererActor::on_start() {
   resume_coarse();
+  if (coarse_.opening() && shared_->parts.layout) coarse_.hurry(shared_->parts.surfaces->shone_on(), kFirstOfBright);
   begin_batch();
 }
 
@@ -113,7 +126,7 @@ void RendererActor::resume_coarse() {
   coarse_.resume(static_cast<std::uint32_t>(least));
   if (!shared_->parts.coarse) return;
   auto batch = std::make_shared<Batch>();
-  add_coarse_pictures(*batch, true);
+  add_coarse_level(*batch, CoarseDue::kPicture, true);
   draw(batch);
 }
 
@@ -129,6 +142,8 @@ void RendererActor::on(SliceFinished&& message) {
   if (phase_ == Phase::kShading) {
     shared_->metrics().observe("darm_renderer_phase_seconds", seconds, {{"phase", "shading"}});
     finish_shading();
+  } else if (phase_ == Phase::kStoredLight) {
+    finish_stored_light();
   } else {
     shared_->metrics().observe("darm_renderer_phase_seconds", seconds, {{"phase", "pictures"}});
     finish_pictures();
@@ -140,8 +155,8 @@ bool RendererActor::rare_light() const { return coarse_lost_share_ > kRareLight;
 
 // There samples of the coarse level, which paths end in, are worth most.
 double RendererActor::coarse_share() const {
-  if (coarse_.finished()) return 0;
-  const bool pressing = rare_light() && !coarse_.even();
+  if (coarse_.finished() && !coarse_.hurries()) return 0;
+  const bool pressing = coarse_.hurries() || unsettled_until_ || (rare_light() && !coarse_.even());
   return pressing ? kPressingShare : double{shared_->parts.options.coarse_share};
 }
 
@@ -181,6 +196,26 @@ bool RendererActor::begin_recall() {
   return true;
 }
 
+// The first samples of a scene whose light is rare say less than one that is aimed, and would be seen for long beside
+// those that follow.
+void RendererActor::learn_aim(bool aims) {
+  if (unsettled_until_ && coarse_.round() > *unsettled_until_) unsettled_until_.reset();
+  if (aims_ || !aims) return;
+  aims_ = true;
+  if (coarse_.opening() || coarse_.round() > kLastRenewed) return;  // nothing was lit, or enough
+  renews_ = true;
+  unsettled_until_ = coarse_.round();
+}
+
+void RendererActor::renew(std::vector<TileJob>& jobs) {
+  if (!renews_) return;
+  for (TileJob& job : jobs) {
+    if (job.passes == 0 || job.hurried || !renewed_.insert(job.tile).second) continue;
+    job.renew = true;
+    schedule_.forget_picture(job.tile);
+  }
+}
+
 void RendererActor::begin_batch() {
   if (phase_ == Phase::kPictures && slices_left_ > 0) return;
   if (waiting_) {
@@ -193,6 +228,7 @@ void RendererActor::begin_batch() {
   }
   auto batch = std::make_shared<Batch>();
   batch->jobs = choose_jobs();
+  renew(batch->jobs);
   if (batch->jobs.empty()) {
     batch_ = std::move(batch);
     begin_pictures();  // a tile back in view has its picture due, with nothing left to shade
@@ -246,7 +282,8 @@ void RendererActor::shade_one(Shared& shared, Batch& batch, std::size_t index) {
   if (job.passes == 0) {
     result.shading.progress = survey_tile(*shared.parts.store, job.tile, job.mask, *surface);
   } else {
-    auto shaded = shade_tile(*shared.parts.store, job.tile, job.mask, job.passes, *surface, job.most);
+    auto shaded = shade_tile(*shared.parts.store, job.tile, job.mask, job.passes, *surface, job.most,
+                             job.renew ? Few::kReplaced : Few::kKept);
     if (!shaded) {
       result.failed = true;
       return;
@@ -292,7 +329,7 @@ void RendererActor::finish_shading() {
     if (r.shading.samples > 0) seconds += r.seconds;
   }
   learn_cost(seconds, samples);
-  coarse_due_ = coarse_.batch_finished() || coarse_due_;
+  coarse_due_ = std::max(coarse_.batch_finished(), coarse_due_);
   auto& metrics = shared_->metrics();
   metrics.count("darm_renderer_texel_samples_total", static_cast<double>(samples));
   metrics.count("darm_renderer_tiles_shaded_total", static_cast<double>(tiles));
@@ -314,8 +351,8 @@ void RendererActor::begin_pictures() {
     job.mask = *schedule_.mask_of(tile);
     next->jobs.push_back(job);
   }
-  if (coarse_due_ && shared_->parts.coarse) add_coarse_pictures(*next, false);
-  coarse_due_ = false;
+  if (shared_->parts.coarse) add_coarse_level(*next, coarse_due_, false);
+  coarse_due_ = CoarseDue::kNothing;
   if (next->jobs.empty()) {
     const bool worked = !batch_->jobs.empty();
     phase_ = Phase::kIdle;
@@ -325,18 +362,28 @@ void RendererActor::begin_pictures() {
   draw(next);
 }
 
-void RendererActor::add_coarse_pictures(Batch& batch, bool recall) {
+void RendererActor::add_coarse_level(Batch& batch, CoarseDue due, bool recall) {
+  if (due == CoarseDue::kNothing) return;
+  TileJob job;
+  job.mask = TexelMask::all();
+  job.coarse = true;
+  job.recall = recall;
+  const auto add = [&](std::uint32_t tile) {
+    job.tile = TileId(coarse_.level(), tile);
+    job.keep = due == CoarseDue::kPicture && !schedule_.has(job.tile);  // one writer
+    batch.jobs.push_back(job);
+  };
+  batch.first = coarse_.opening();
+  batch.of_all = due == CoarseDue::kLight || coarse_.round() > 0;
+  if (due == CoarseDue::kLight) {  // all else is as it was
+    batch.light = shared_->light ? std::make_shared<StoredLight>(*shared_->light)
+                                 : std::make_shared<StoredLight>(shared_->parts.layout);
+    for (const CoarseRequest& texels : coarse_.hurried()) add(texels.tile);
+    return;
+  }
   batch.canvas = std::make_shared<CoarseCanvas>(coarse_.tiles(), ++coarse_number_);
   if (shared_->parts.layout) batch.light = std::make_shared<StoredLight>(shared_->parts.layout);
-  for (std::uint32_t t = 0; t < coarse_.tiles().x * coarse_.tiles().y; ++t) {
-    TileJob job;
-    job.tile = TileId(coarse_.level(), t);
-    job.mask = TexelMask::all();
-    job.coarse = true;
-    job.recall = recall;
-    job.keep = !schedule_.has(job.tile);  // one writer
-    batch.jobs.push_back(job);
-  }
+  for (std::uint32_t t = 0; t < coarse_.tiles().x * coarse_.tiles().y; ++t) add(t);
 }
 
 void RendererActor::draw(const std::shared_ptr<Batch>& batch) {
@@ -363,7 +410,7 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
       shared.divided.forget(job.tile.index(), texels, *shared.parts.surfaces);
       batch.light->put(job.tile.index(), texels);
     }
-    if (picture) batch.canvas->put(job.tile.index(), *picture->image);
+    if (picture && batch.canvas) batch.canvas->put(job.tile.index(), *picture->image);
     if (picture && picture->samples > 0) batch.results[index].lost_share = picture->lost_share;
   } else {
     batch.results[index].picture = std::move(picture);
@@ -378,11 +425,49 @@ float RendererActor::mean_lost_share(const Batch& batch) {
 }
 
 void RendererActor::finish_pictures() {
+  send_pictures();
+  if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
+  if (batch_->light)
+    begin_stored_light();
+  else
+    begin_batch();
+}
+
+// Reads the whole level: one slice, after those that filled it.
+void RendererActor::begin_stored_light() {
+  if (batch_->canvas) coarse_lost_share_ = mean_lost_share(*batch_);
+  phase_ = Phase::kStoredLight;
+  post_slices(batch_, {batch_->jobs.size() - 1}, &RendererActor::find_bright);
+}
+
+void RendererActor::find_bright(Shared& shared, Batch& batch, std::size_t) {
+  if (batch.of_all)
+    shared.parts.surfaces->find_bright(*batch.light);
+  else if (shared.light)
+    batch.light->give_bright(shared.light->bright());
+  const BrightTexels& bright = batch.light->bright();
+  const auto measures = measure_bright(bright, *shared.parts.store, batch.light->level());
+  batch.wanted = bright_samples(measures, batch.first ? kFirstTolerance : kTolerance);
+  if (batch.wanted > 0) batch.wanting = requests_of(bright);
+}
+
+void RendererActor::finish_stored_light() {  // no slice runs now
+  shared_->metrics().set("darm_renderer_bright_texels", static_cast<double>(batch_->light->bright().size()));
+  shared_->parts.surfaces->use_stored_light(batch_->light);
+  shared_->light = batch_->light;
+  if (shared_->parts.light) shared_->parts.light(batch_->light);
+  learn_aim(!batch_->light->bright().empty());
+  if (!batch_->wanting.empty()) coarse_.hurry(batch_->wanting, batch_->wanted);
+  begin_batch();
+}
+
+void RendererActor::send_pictures() {
   std::vector<tile_scheduler::ShadedTile> tiles;
   for (std::size_t i = 0; i < batch_->jobs.size(); ++i) {
     const TileJob& job = batch_->jobs[i];
     JobResult& r = batch_->results[i];
     if (job.coarse) continue;
+    if (r.picture && unsettled_until_) r.picture->error = std::max(r.picture->error, kUnsettledError);
     if (!job.recall)
       schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f,
                          r.picture && rare_light() ? r.picture->lost_share : 0.0f);
@@ -407,14 +492,6 @@ void RendererActor::finish_pictures() {
         for (const TileId t : names) schedule_.forget_picture(t);
     }
   }
-  if (batch_->light) {  // no slice runs now
-    coarse_lost_share_ = mean_lost_share(*batch_);
-    shared_->parts.surfaces->use_stored_light(batch_->light);
-    shared_->light = batch_->light;
-  }
-  if (batch_->light && shared_->parts.light) shared_->parts.light(batch_->light);
-  if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
-  begin_batch();
 }
 
 }  // namespace darm::renderer

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <unordered_set>
 #include <vector>
 
 #include "actors/renderer/coarse_level.hpp"
@@ -42,9 +43,9 @@ struct RendererParts {
   runtime::MetricSink* metrics = nullptr;  ///< must outlive the pool's work; null: none
 };
 
-/// Works in phases that never overlap: a batch of shading (each tile has one writer), then pictures (readers only).
-/// Between batches the newest ShadeTiles takes hold. Its mailbox must hold a batch's slices: capacity 1024 serves 64
-/// workers.
+/// Works in phases that never overlap: a batch of shading (each tile has one writer), then pictures (readers only),
+/// then, where the coarse level was drawn, a look for what paths may aim at. Between batches the newest ShadeTiles
+/// takes hold. Its mailbox must hold a batch's slices: capacity 1024 serves 64 workers.
 class RendererActor : public runtime::Actor<Inbox> {
  public:
   RendererActor(runtime::Context<Inbox> context, RendererParts parts);
@@ -53,7 +54,7 @@ class RendererActor : public runtime::Actor<Inbox> {
   void on(SliceFinished&& message);
 
  private:
-  enum class Phase { kIdle, kShading, kPictures };
+  enum class Phase { kIdle, kShading, kPictures, kStoredLight };
   struct Shared;  // what pool work touches
   struct JobResult;
   struct Batch;  // one phase's work and results
@@ -63,16 +64,22 @@ class RendererActor : public runtime::Actor<Inbox> {
   void resume_coarse();
   void finish_shading();
   void begin_pictures();
-  void add_coarse_pictures(Batch& batch, bool recall);
+  void add_coarse_level(Batch& batch, CoarseDue due, bool recall);
   void draw(const std::shared_ptr<Batch>& batch);
   void finish_pictures();
+  void send_pictures();
+  void begin_stored_light();
+  void finish_stored_light();
   void post_slices(const std::shared_ptr<Batch>& batch, std::vector<std::size_t> starts,
                    void (*work)(Shared&, Batch&, std::size_t));
   [[nodiscard]] std::vector<TileJob> choose_jobs();
   [[nodiscard]] bool rare_light() const;
+  void renew(std::vector<TileJob>& jobs);
+  void learn_aim(bool aims);
   [[nodiscard]] double coarse_share() const;
   [[nodiscard]] static float mean_lost_share(const Batch& batch);
   static void shade_one(Shared& shared, Batch& batch, std::size_t index);
+  static void find_bright(Shared& shared, Batch& batch, std::size_t index);
   static void picture_one(Shared& shared, Batch& batch, std::size_t index);
   void learn_cost(double seconds, std::uint64_t samples);
 
@@ -88,9 +95,13 @@ class RendererActor : public runtime::Actor<Inbox> {
   double sample_us_ = 12;  // running estimate of one sample's time on one worker
   std::uint32_t picture_number_ = 0;
   std::uint32_t coarse_number_ = 0;
-  double coarse_credit_ = 0;     // samples the coarse level may take
-  float coarse_lost_share_ = 0;  // mean of its tiles, as TilePicture has it
-  bool coarse_due_ = false;
+  double coarse_credit_ = 0;  // samples the coarse level may take
+  bool aims_ = false;         // paths aim at bright texels
+  bool renews_ = false;
+  std::unordered_set<TileId> renewed_;            // where samples from before that are replaced
+  std::optional<std::uint32_t> unsettled_until_;  // this round of the coarse level is over: it was lit before that
+  float coarse_lost_share_ = 0;                   // mean of its tiles, as TilePicture has it
+  CoarseDue coarse_due_ = CoarseDue::kNothing;
 };
 
 }  // namespace darm::renderer

@@ -8,10 +8,12 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "actors/atlas/layout.hpp"
 #include "actors/atlas/radiance_store.hpp"
+#include "actors/renderer/bright_texels.hpp"
 #include "actors/renderer/filter_irradiance.hpp"
 #include "actors/renderer/light_guess.hpp"
 #include "actors/renderer/trace/surface.hpp"
@@ -48,6 +50,13 @@ class StoredLight {
   /// its four texels that are known. nullopt: none is. The patch must own the place, its gutter included.
   [[nodiscard]] std::optional<LightGuess> guess(PatchId patch, int level, const glm::vec2& at) const;
 
+  /// The brightest of its texels, for paths to aim at; none until they are given. Not while another thread reads.
+  [[nodiscard]] const BrightTexels& bright() const { return bright_; }
+  void give_bright(BrightTexels bright) { bright_ = std::move(bright); }
+
+  /// Row-major over the coarse level.
+  [[nodiscard]] std::span<const StoredTexel> texels() const { return texels_; }
+  [[nodiscard]] const std::shared_ptr<const atlas::Layout>& layout() const { return layout_; }
   /// The level it is of.
   [[nodiscard]] int level() const { return layout_->coarse_level(); }
   /// A ray shorter than this ends too near its start for texels of the coarse level: corners and contacts would smear.
@@ -56,7 +65,8 @@ class StoredLight {
  private:
   std::shared_ptr<const atlas::Layout> layout_;
   float least_distance_ = 0;
-  std::vector<StoredTexel> texels_;  // row-major over the coarse level
+  std::vector<StoredTexel> texels_;
+  BrightTexels bright_;
 };
 
 }  // namespace darm::renderer

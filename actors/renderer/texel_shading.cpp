@@ -16,6 +16,7 @@ constexpr float kSettled = 0.02f;  // of the texel's light: samples that differ 
 
 struct TexelWork {
   int texel;
+  bool replaces;
   atlas::TexelBatch sharp;
   atlas::TexelBatch soft;
 };
@@ -82,7 +83,7 @@ TexelMask lit_texels(const atlas::RadianceStore& store, TileId tile) {
 }
 
 Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask, std::uint32_t passes,
-                                 const TileSurface& surface, std::uint32_t most) {
+                                 const TileSurface& surface, std::uint32_t most, Few few) {
   ShadingResult result;
   const auto view = store.read(tile);
   result.progress = progress_of(mask, surface, view);
@@ -94,14 +95,16 @@ Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const
   for (int t = 0; t < kTileTexels; ++t) {
     if (!mask.test(t) || surface.patch(t) == kNobody) continue;
     const auto have_sharp = view ? static_cast<std::uint32_t>(view->count(Layer::kSharp, t)) : 0u;
-    const auto have_soft = view ? static_cast<std::uint32_t>(view->count(Layer::kSoft, t)) : 0u;
+    auto have_soft = view ? static_cast<std::uint32_t>(view->count(Layer::kSoft, t)) : 0u;
+    const bool replaces = few == Few::kReplaced && have_soft > 0 && have_soft <= kFewSamples;
+    if (replaces) have_soft = 0;
     Goal goal;
     if (first) {
       goal = {1, leads(surface, mask, t) ? 1u : 0u};
     } else if (have_soft < soft_goal) {
       goal = {std::max(1u, sharp_varies(*view, t) ? 2 * soft_goal : soft_goal / 4), soft_goal};
     }
-    TexelWork texel{t, {}, {}};
+    TexelWork texel{t, replaces, {}, {}};
     const auto take = [&](std::uint32_t have, std::uint32_t wanted, atlas::TexelBatch& batch, const auto& sample) {
       for (std::uint32_t i = have; i < std::min(wanted, have + 2 * passes); ++i) {
         ++result.samples;
@@ -120,6 +123,7 @@ Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const
     if (!update) return std::unexpected(update.error());
     for (const auto& w : work) {
       if (w.sharp.count > 0) update->merge(w.texel, Layer::kSharp, w.sharp);
+      if (w.soft.count > 0 && w.replaces) update->forget(w.texel, Layer::kSoft);
       if (w.soft.count > 0) update->merge(w.texel, Layer::kSoft, w.soft);
     }
   }

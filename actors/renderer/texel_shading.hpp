@@ -32,15 +32,20 @@ struct ShadingResult {
 /// The texels that have a sample of any light. Reads the store.
 [[nodiscard]] TexelMask lit_texels(const atlas::RadianceStore& store, TileId tile);
 
+/// What becomes of few samples of soft light that were taken when less was known.
+enum class Few : std::uint8_t { kKept, kReplaced };
+inline constexpr std::uint32_t kFewSamples = 8;
+
 /// Where texels of `mask` were never looked at, a first pass: sharp light for each of them, soft light for one texel in
 /// four (and for those whose 2x2 block has none of their patch), which the display spreads. Else up to `passes` samples
 /// of soft light for each texel; texels that are ahead of the least one by more than that wait, so that newly seen
 /// texels catch up, and none goes beyond `most`; of sharp light twice as many where the texel's samples differ (lamps,
 /// penumbras, edges), a quarter where they do not. Nothing outside the mask is touched. Sample numbers continue where
-/// the store stands, so a restart goes on in the same sequence. The store is held open only to merge: a crash costs one
-/// merge. Fails if the store takes no new tile. One thread per tile.
+/// the store stands, so a restart goes on in the same sequence. `few`: what a texel has of soft light is replaced, not
+/// added to, if it is no more than kFewSamples. The store is held open only to merge: a crash costs one merge. Fails if
+/// the store takes no new tile. One thread per tile.
 [[nodiscard]] Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask,
                                                std::uint32_t passes, const TileSurface& surface,
-                                               std::uint32_t most = 0xffffffffu);
+                                               std::uint32_t most = 0xffffffffu, Few few = Few::kKept);
 
 }  // namespace darm::renderer

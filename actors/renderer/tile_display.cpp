@@ -60,6 +60,10 @@ class FillError {
   int known_ = 0;
 };
 
+// A texel whose standard error is this share of its mean or less, of enough samples to say so, is what light is like
+// there: rare bright samples are of no such accord before there are sixteen of them.
+constexpr float kSure = 0.25f;
+constexpr float kFewSamples = 8;
 constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
 
 // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
@@ -120,16 +124,28 @@ void TileDisplay::gather_nine() {
   }
 }
 
+bool TileDisplay::sure_of(std::size_t at) const {
+  const Place place = place_of_nine(at);
+  const auto& light = *around_[place.tile].light;
+  const float grey = square_.grey[at];
+  return square_.count[at] >= kFewSamples &&
+         light.variance_of_mean(Layer::kSoft, place.texel, grey * grey) <= kSure * kSure * grey * grey;
+}
+
+TileDisplay::Place TileDisplay::place_of_nine(std::size_t at) const {
+  const int x = static_cast<int>(at) % square_.size;
+  const int y = static_cast<int>(at) / square_.size;
+  return {static_cast<std::size_t>(y / kTileSize * 3 + x / kTileSize), y % kTileSize * kTileSize + x % kTileSize};
+}
+
 void TileDisplay::find_lost() {
   find_outliers(square_, outliers_);
+  std::erase_if(outliers_, [&](const Outlier& outlier) { return sure_of(outlier.at); });
   lost_.clear();
   for (const Outlier& outlier : outliers_) {
-    const int x = static_cast<int>(outlier.at) % square_.size;
-    const int y = static_cast<int>(outlier.at) / square_.size;
-    const int tile = y / kTileSize * 3 + x / kTileSize;
-    const int texel = y % kTileSize * kTileSize + x % kTileSize;
-    const glm::vec3 soft = around_[static_cast<std::size_t>(tile)].light->mean(Layer::kSoft, texel);
-    lost_.take(tile, square_.patch[outlier.at], soft * (1 - outlier.scale),
+    const Place place = place_of_nine(outlier.at);
+    const glm::vec3 soft = around_[place.tile].light->mean(Layer::kSoft, place.texel);
+    lost_.take(static_cast<int>(place.tile), square_.patch[outlier.at], soft * (1 - outlier.scale),
                square_.grey[outlier.at] * (1 - outlier.scale));
   }
   lost_.measure(square_);
@@ -168,7 +184,7 @@ void TileDisplay::share_out() {
       lost += double{share.grey};
       shown += double{luminance({texel.irradiance[0], texel.irradiance[1], texel.irradiance[2]})};
     }
-  lost_share_ = shown > 0 ? static_cast<float>(lost / shown) : 0.0f;
+  lost_share_ = lost > 0 ? static_cast<float>(lost / (lost + shown)) : 0.0f;
 }
 
 // Around the window, of the nine tiles.

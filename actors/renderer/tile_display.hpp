@@ -31,7 +31,8 @@ struct TilePicture {
   /// noise, and what the filter smears and holds down.
   float error = 0;
   float samples = 0;  ///< mean samples per texel of the mask
-  /// Of soft light, mean over its texels: what outliers lost, in this tile and those beside it, over what is shown.
+  /// Of soft light, mean over its texels: what outliers lost, in this tile and those beside it, of that and of what is
+  /// shown. 0..1.
   float lost_share = 0;
 };
 
@@ -67,6 +68,13 @@ class TileDisplay {
   };
   void look_around(TileId id, const LevelTiles& level);
   [[nodiscard]] bool wants_filter(const TexelMask& mask) const;
+  // Of the nine tiles, and the texel in it.
+  struct Place {
+    std::size_t tile;
+    int texel;
+  };
+  [[nodiscard]] Place place_of_nine(std::size_t at) const;
+  [[nodiscard]] bool sure_of(std::size_t at) const;
   void gather_nine();
   void find_lost();
   [[nodiscard]] int margin_of_window() const;

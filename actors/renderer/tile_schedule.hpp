@@ -19,6 +19,8 @@ struct TileJob {
   std::uint32_t passes = 0;          ///< 0: survey, no sample is taken
   std::uint32_t most = 0xffffffffu;  ///< no texel beyond this many samples
   std::uint32_t cost = 0;            ///< estimated samples
+  bool hurried = false;              ///< ahead of its round
+  bool renew = false;                ///< few samples of soft light are replaced
   bool coarse = false;               ///< for the coarse level, not for the working set
   bool recall = false;               ///< take the stored picture, draw nothing
   bool keep = true;                  ///< store the picture

@@ -6,7 +6,9 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <vector>
 
+#include "actors/renderer/renderer_messages.hpp"
 #include "actors/types/tile_id.hpp"
 
 namespace darm::renderer {
@@ -49,6 +51,11 @@ class TileSurfaces {
   virtual ~TileSurfaces() = default;
   /// Null outside the level. The surface samples with the stored light of the moment it was asked for.
   [[nodiscard]] virtual std::shared_ptr<const TileSurface> tile(TileId id) const = 0;
+  /// Texels of the coarse level that surfaces which emit shine on, where those are the scene's only light and shine on
+  /// little; else none. Some milliseconds.
+  [[nodiscard]] virtual std::vector<CoarseRequest> shone_on() const { return {}; }
+  /// Gives `light`, which nobody else reads yet, its bright texels. Long work.
+  virtual void find_bright(StoredLight& light) const { (void)light; }
   /// From now on paths end in `light` (null: in none). Not while another thread calls tile().
   virtual void use_stored_light(std::shared_ptr<const StoredLight> light) { (void)light; }
 };

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "actors/renderer/sampler.hpp"
+#include "actors/renderer/sampling.hpp"
 #include "actors/renderer/surface_world.hpp"
 
 namespace darm::renderer {
@@ -12,6 +14,10 @@ namespace darm::renderer {
 namespace {
 
 constexpr std::uint64_t kAlbedoSeed = 0xa1bed0;
+constexpr std::uint32_t kEmitterSeed = 0xe317;
+constexpr std::uint32_t kEmitterRays = 4096;
+constexpr float kOffEmitter = 1e-5f;   // of the largest coordinate
+constexpr double kConcentrated = 100;  // times as many rays meet where another did as if they went to all texels alike
 constexpr std::uint64_t kSoftSeed = 0x50f7;  // the two layers draw apart
 
 class SceneTile : public TileSurface {
@@ -123,12 +129,64 @@ class SceneSurfaces : public TileSurfaces {
     if (id.index() >= level.tiles_x * level.tiles_y) return nullptr;
     return std::make_shared<SceneTile>(id, world_, stored_);
   }
+  [[nodiscard]] std::vector<CoarseRequest> shone_on() const override;
+  [[nodiscard]] std::optional<CoarseRequest> shone_on(std::uint32_t ray) const;
+  void find_bright(StoredLight& light) const override {
+    light.give_bright(BrightTexels(light, *world_->mapper, *world_->transport));
+  }
   void use_stored_light(std::shared_ptr<const StoredLight> light) override { stored_ = std::move(light); }
 
  private:
   std::shared_ptr<const SurfaceWorld> world_;
   std::shared_ptr<const StoredLight> stored_;
 };
+
+// Where a ray from a point of an emitter ends: each has as much light.
+std::optional<CoarseRequest> SceneSurfaces::shone_on(std::uint32_t ray) const {
+  Sampler sampler(world_->seed, kEmitterSeed, ray);
+  const float pick = sampler.next_1d();
+  const EmitterDraw from = world_->transport->lights().draw_emitter(pick, sampler.next_2d());
+  if (!(from.pdf_area > 0)) return std::nullopt;
+  const glm::vec3 normal = from.double_sided && sampler.next_1d() < 0.5f ? -from.normal : from.normal;
+  glm::vec3 tangent, bitangent;
+  trace::make_frame(normal, tangent, bitangent);
+  const glm::vec3 d = sample_cosine(sampler.next_2d());
+  const glm::vec3 origin = from.position + normal * (kOffEmitter * trace::detail::largest_size(from.position));
+  trace::Hit hit;
+  if (!world_->transport->rays().closest({origin, 0.0f, tangent * d.x + bitangent * d.y + normal * d.z, 1e30f}, hit))
+    return std::nullopt;
+  const auto& layout = world_->mapper->layout();
+  const PatchId patch = layout.patch_of(hit.instance, hit.triangle, hit.front);
+  if (patch == kNoPatch) return std::nullopt;
+  const int level = layout.coarse_level();
+  const glm::vec2 at = layout.texel_at(patch, level, layout.patch_uv(hit.instance, hit.triangle, hit.u, hit.v));
+  CoarseRequest texel;
+  texel.tile = layout.tile_at(level, at).index();
+  texel.mask.set(static_cast<int>(at.x) % kTileSize, static_cast<int>(at.y) % kTileSize);
+  return texel;
+}
+
+std::vector<CoarseRequest> SceneSurfaces::shone_on() const {
+  std::vector<CoarseRequest> out;
+  const auto& lights = world_->transport->lights();
+  // Of other light it is not known what it is beside theirs.
+  if (!lights.has_emitters() || lights.has_punctual() || !lights.suns().empty() || world_->scene->sky.emits())
+    return out;
+  std::map<std::uint32_t, std::uint32_t> met;  // texel of the level -> rays
+  for (std::uint32_t i = 0; i < kEmitterRays; ++i) {
+    const auto texel = shone_on(i);
+    if (!texel) continue;
+    std::uint32_t t = 0;
+    while (!texel->mask.test(static_cast<int>(t))) ++t;
+    if (++met[texel->tile * kTileTexels + t] == 1) out.push_back(*texel);
+  }
+  double pairs = 0;
+  for (const auto& [texel, rays] : met) pairs += double{rays - 1.0} * rays;
+  const auto& level = world_->mapper->layout().levels.back();
+  const double texels = double{level.width * 1.0} * level.height;
+  if (pairs * texels < kConcentrated * kEmitterRays * (kEmitterRays - 1.0)) out.clear();
+  return out;
+}
 
 }  // namespace
 

@@ -40,6 +40,7 @@ constexpr auto kHelp = std::to_array<Entry>({
     {"darm_metric_series_dropped_total", "Measurements of series over the limit"},
     {"darm_ready", "1 while clients can connect"},
     {"darm_regroup_seconds", "Time to decide which sessions share streams, and to move them"},
+    {"darm_renderer_bright_texels", "Texels of stored light that paths aim at; 0 where light is even enough"},
     {"darm_renderer_effect", "1 for an effect of light that the scene calls for, 0 for one it does not"},
     {"darm_renderer_effect_runs_total", "How often the code of an effect ran"},
     {"darm_renderer_images_total", "Pictures of tiles handed to the scheduler"},

@@ -178,6 +178,7 @@ inline std::shared_ptr<const renderer::StoredLight> light_coarse(LitView& view, 
       if (const auto stored = store.read(tile))
         light->put(tile.index(), renderer::stored_texels(*stored, display.filtered()));
     });
+    surfaces.find_bright(*light);
     surfaces.use_stored_light(light);
     last = light;
   }

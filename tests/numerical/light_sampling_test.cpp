@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <map>
 
+#include "actors/renderer/bright_texels.hpp"
 #include "actors/renderer/light_set.hpp"
 #include "actors/renderer/sampling.hpp"
 #include "tests/numerical/statistics.hpp"
 #include "tests/numerical/worst.hpp"
+#include "tests/unit/renderer_light/lit_room.hpp"
 #include "tests/unit/trace/hand_scene.hpp"
 
 namespace darm::numerical {
@@ -219,6 +223,53 @@ TEST(Sampling, picks_of_lamps_add_up_to_all_of_them) {
       });
       off.see(e.sigmas_from(truth, 1e-5 * truth), "lamps", lamps, "picks", picks, "mean", e.mean, "truth", truth);
     }
+}
+
+TEST(Sampling, bright_texels_are_drawn_as_densely_as_they_say) {
+  Worst off("chi-square of points of bright texels: normal deviate", kChiDeviate);
+  const LitRoom room(spot_light);
+  const BrightTexels& bright = room.aimed->bright();
+  ASSERT_FALSE(bright.empty());
+  const auto& level = room.layout->levels.back();
+  const int coarse = room.layout->coarse_level();
+  const auto texel_of = [&](const SurfacePoint& p) {
+    return room.layout->texel_at(room.layout->patch_of(p.instance, p.triangle, p.front), coarse,
+                                 room.layout->patch_uv(p.instance, p.triangle, p.u, p.v));
+  };
+  const auto n = scaled(200000u);
+  for (const glm::vec3 at : {glm::vec3(-0.6f, -2, -0.4f), glm::vec3(1.9f, 1.2f, -1.9f)}) {
+    const auto aim = bright.aim(at, glm::normalize(-at), 0.5f);
+    ASSERT_GT(aim.chance, 0);
+    std::map<std::uint32_t, double> counts;
+    std::vector<double> within(64, 0);
+    double drawn = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      Sampler sampler(kSeed + 31, i, 0);
+      const float pick = sampler.next_1d();
+      const auto point = bright.draw(aim, pick, sampler.next_2d());
+      if (!point) continue;
+      const glm::vec2 texel = texel_of(*point);
+      ++counts[static_cast<std::uint32_t>(texel.y) * level.width + static_cast<std::uint32_t>(texel.x)];
+      const glm::dvec2 part(glm::fract(texel));
+      ++within[cell(part.x, 8) * 8 + cell(part.y, 8)];
+      ++drawn;
+    }
+    EXPECT_EQ(drawn, n) << "the spot's texels are all full";
+    std::vector<double> seen, expected;
+    double all = 0;
+    for (std::size_t i = 0; i < bright.size(); ++i) {
+      const auto [tile, texel, flux, soft, share] = bright.place(i);
+      const auto point = room.mapper->tile(TileId(coarse, tile))->center(texel % kTileSize, texel / kTileSize);
+      const auto s = trace::make_surface(*room.rays, *point);
+      const glm::vec2 place = texel_of(*point);
+      expected.push_back(n * double{bright.pdf_area(aim, *point, s.area)} / (double{level.density} * level.density));
+      all += expected.back() / n;
+      seen.push_back(counts[static_cast<std::uint32_t>(place.y) * level.width + static_cast<std::uint32_t>(place.x)]);
+    }
+    EXPECT_NEAR(all, 1, 1e-4);
+    off.see(chi_deviate(seen, expected), "by texel");
+    off.see(chi_deviate(within, std::vector<double>(64, n / 64.0)), "within them");
+  }
 }
 
 }  // namespace

@@ -249,7 +249,7 @@ TEST(CoarseRoundsTest, rounds_end_and_pictures_come_at_powers_of_two) {
   for (int i = 0; i < 1000 && !rounds.finished(); ++i) {
     for (const auto& job : rounds.next_batch(1500)) round = std::max(round, job.most);
     EXPECT_EQ(rounds.even(), round > 2) << "from then on every texel has two";
-    if (rounds.batch_finished()) pictures.push_back(round);
+    if (rounds.batch_finished() == CoarseDue::kPicture) pictures.push_back(round);
   }
   EXPECT_EQ(pictures, (std::vector<std::uint32_t>{1, 1, 2, 4, 8, 10}));  // the first is the first pass
   EXPECT_TRUE(rounds.finished());
@@ -266,11 +266,46 @@ TEST(CoarseRoundsTest, what_is_seen_comes_first_and_is_enough_for_a_picture) {
   EXPECT_EQ(jobs[0].tile.index(), 2u);
   EXPECT_EQ(jobs[1].tile.index(), 7u);
   EXPECT_EQ(jobs[1].mask.count(), 2);
-  EXPECT_TRUE(rounds.batch_finished());
+  EXPECT_EQ(rounds.batch_finished(), CoarseDue::kPicture);
   EXPECT_FALSE(rounds.opening());
   // The rest of round 0 has every tile whole, those too.
   EXPECT_EQ(rounds.next_batch(1u << 20).size(), 9u);
-  EXPECT_TRUE(rounds.batch_finished());
+  EXPECT_EQ(rounds.batch_finished(), CoarseDue::kPicture);
+}
+
+TEST(CoarseRoundsTest, what_is_hurried_comes_before_all_and_a_tile_once_in_a_batch) {
+  CoarseRounds rounds(1, LevelTiles{3, 3}, 10);
+  TexelMask one;
+  one.set(4, 4);
+  rounds.prefer(std::vector<CoarseRequest>{{3, one}});
+  rounds.hurry(std::vector<CoarseRequest>{{5, one}, {99, one}, {2, one}, {5, one}}, 40);
+  std::vector<std::uint32_t> reached;
+  while (rounds.hurries()) {
+    const auto jobs = rounds.next_batch(1000);
+    ASSERT_EQ(jobs.size(), 2u);
+    EXPECT_EQ(jobs[0].tile.index(), 2u);
+    EXPECT_EQ(jobs[1].tile.index(), 5u);
+    EXPECT_EQ(jobs[0].most, jobs[1].most);
+    EXPECT_LE(jobs[0].passes, 16u) << "a job is no long work";
+    reached.push_back(jobs[0].most);
+    EXPECT_EQ(rounds.batch_finished(), rounds.hurries() ? CoarseDue::kNothing : CoarseDue::kLight);
+  }
+  EXPECT_EQ(reached, (std::vector<std::uint32_t>{1, 16, 32, 40}));
+  EXPECT_TRUE(rounds.opening()) << "light is no picture";
+  EXPECT_EQ(rounds.next_batch(1000).size(), 1u);
+  EXPECT_EQ(rounds.batch_finished(), CoarseDue::kPicture);
+}
+
+TEST(CoarseRoundsTest, after_the_last_round_texels_may_still_be_hurried) {
+  CoarseRounds rounds(1, LevelTiles{3, 3}, 10);
+  rounds.resume(1000);
+  EXPECT_EQ(rounds.batch_finished(), CoarseDue::kNothing);
+  TexelMask one;
+  one.set(4, 4);
+  rounds.hurry(std::vector<CoarseRequest>{{5, one}}, 1);
+  EXPECT_EQ(rounds.next_batch(1000).size(), 1u);
+  EXPECT_EQ(rounds.batch_finished(), CoarseDue::kLight);
+  EXPECT_TRUE(rounds.next_batch(1000).empty());
 }
 
 TEST(CoarseCanvasTest, tiles_without_light_are_as_bright_as_the_nearest_and_grey) {
