@@ -7,9 +7,9 @@
 namespace darm::renderer {
 namespace {
 
-constexpr double kAbout = 1.25;    // times the tolerance: not worth another look
-constexpr double kGain = 0.7;      // what is left of the square has to be less, or it is not worth it
-constexpr double kMost = 1 << 12;  // samples a texel
+constexpr double kAbout = 1.25;           // times the tolerance: not worth another look
+constexpr double kGain = 0.7;             // what is left of the square has to be less, or it is not worth it
+constexpr double kMostOfTexel = 1 << 12;  // samples a texel
 
 }  // namespace
 
@@ -23,7 +23,7 @@ std::uint32_t bright_samples(std::span<const BrightMeasure> texels, float tolera
   }
   const double allowed = double{tolerance} * flux;
   if (!(allowed > 0) || !(square_now > kAbout * kAbout * allowed * allowed)) return 0;
-  const double most = std::min(kSamplesOfBright / static_cast<double>(texels.size()), kMost);
+  const double most = std::min(kSamplesOfBright / static_cast<double>(texels.size()), kMostOfTexel);
   const auto wanted = std::bit_ceil(static_cast<std::uint32_t>(std::min(squares / (allowed * allowed), most)) | 1u);
   double square_then = 0;
   for (const auto& t : texels)

@@ -11,9 +11,9 @@
 namespace darm::renderer {
 namespace {
 
-constexpr float kStandsOut = 6.0f;       // times the mean, what is not known taken for dark
-constexpr std::size_t kMost = 1u << 17;  // texels
-constexpr float kOfMean = 0.5f;          // what surfaces reflect, where only roughly needed
+constexpr float kStandsOut = 6.0f;             // times the mean, what is not known taken for dark
+constexpr std::size_t kMostBright = 1u << 17;  // texels
+constexpr float kOfMean = 0.5f;                // what surfaces reflect, where only roughly needed
 constexpr float kWorth = 0.125f;      // over the spread of what rays find, squared, of its mean: the chance of a draw
 constexpr float kLeastChance = 0.5f;  // less is not worth its time
 constexpr float kLeastLight = 0.25f;  // of what bright texels would send there, if nothing stood between
@@ -34,8 +34,8 @@ Threshold threshold_of(std::vector<float> values, std::size_t all) {
   for (const float v : values) sum += double{v};
   Threshold out;
   out.least = kStandsOut * static_cast<float>(sum / static_cast<double>(std::max(all, std::size_t{1})));
-  if (kMost < values.size()) {
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(kMost);
+  if (kMostBright < values.size()) {
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(kMostBright);
     std::ranges::nth_element(values, nth, std::greater<>());
     out.least = std::max(*nth, out.least);
   }

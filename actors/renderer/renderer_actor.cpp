@@ -202,7 +202,7 @@ void RendererActor::learn_aim(bool aims) {
   if (unsettled_until_ && coarse_.round() > *unsettled_until_) unsettled_until_.reset();
   if (aims_ || !aims) return;
   aims_ = true;
-  if (coarse_.opening() || coarse_.round() > kLastRenewed) return;  // nothing was lit, or enough
+  if (coarse_.opening() || coarse_.finished() || coarse_.round() > kLastRenewed) return;  // nothing was lit, or enough
   renews_ = true;
   unsettled_until_ = coarse_.round();
 }

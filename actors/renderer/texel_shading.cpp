@@ -96,7 +96,7 @@ Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const
     if (!mask.test(t) || surface.patch(t) == kNobody) continue;
     const auto have_sharp = view ? static_cast<std::uint32_t>(view->count(Layer::kSharp, t)) : 0u;
     auto have_soft = view ? static_cast<std::uint32_t>(view->count(Layer::kSoft, t)) : 0u;
-    const bool replaces = few == Few::kReplaced && have_soft > 0 && have_soft <= kFewSamples;
+    const bool replaces = few == Few::kReplaced && have_soft > 0 && have_soft <= kReplacedSamples;
     if (replaces) have_soft = 0;
     Goal goal;
     if (first) {

@@ -34,7 +34,7 @@ struct ShadingResult {
 
 /// What becomes of few samples of soft light that were taken when less was known.
 enum class Few : std::uint8_t { kKept, kReplaced };
-inline constexpr std::uint32_t kFewSamples = 8;
+inline constexpr std::uint32_t kReplacedSamples = 8;
 
 /// Where texels of `mask` were never looked at, a first pass: sharp light for each of them, soft light for one texel in
 /// four (and for those whose 2x2 block has none of their patch), which the display spreads. Else up to `passes` samples
@@ -42,8 +42,8 @@ inline constexpr std::uint32_t kFewSamples = 8;
 /// texels catch up, and none goes beyond `most`; of sharp light twice as many where the texel's samples differ (lamps,
 /// penumbras, edges), a quarter where they do not. Nothing outside the mask is touched. Sample numbers continue where
 /// the store stands, so a restart goes on in the same sequence. `few`: what a texel has of soft light is replaced, not
-/// added to, if it is no more than kFewSamples. The store is held open only to merge: a crash costs one merge. Fails if
-/// the store takes no new tile. One thread per tile.
+/// added to, if it is no more than kReplacedSamples. The store is held open only to merge: a crash costs one merge.
+/// Fails if the store takes no new tile. One thread per tile.
 [[nodiscard]] Result<ShadingResult> shade_tile(atlas::RadianceStore& store, TileId tile, const TexelMask& mask,
                                                std::uint32_t passes, const TileSurface& surface,
                                                std::uint32_t most = 0xffffffffu, Few few = Few::kKept);

@@ -156,7 +156,7 @@ TEST_F(TileDisplayTest, few_samples_are_replaced_and_many_are_not) {
     ASSERT_TRUE(shade_tile(*store_, TileId(0, tile), TexelMask::all(), 2, *world_.tile(TileId(0, tile)), 0xffffffffu,
                            Few::kReplaced));
     const auto view = *store_->read(TileId(0, tile));
-    if (before <= kFewSamples) {
+    if (before <= kReplacedSamples) {
       EXPECT_EQ(view.count(atlas::Layer::kSoft, 40), 2);
       EXPECT_FLOAT_EQ(view.mean(atlas::Layer::kSoft, 40).x, 0.5f) << "0.25 by an albedo of a half";
       EXPECT_EQ(view.variance_of_mean(atlas::Layer::kSoft, 40, 1), 0.0f);
