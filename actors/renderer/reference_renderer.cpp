@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-double srgb(double x) {
+double exact_srgb(double x) {
   x = std::max(x, 0.0);
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
 }
@@ -133,7 +133,8 @@ double psnr_of_mean(const Picture& half_a, const Picture& half_b) {
   const std::size_t n = std::min(half_a.pixels.size(), half_b.pixels.size());
   for (std::size_t i = 0; i < n; ++i)
     for (int c = 0; c < 3; ++c) {
-      const double d = srgb(static_cast<double>(half_a.pixels[i][c])) - srgb(static_cast<double>(half_b.pixels[i][c]));
+      const double d =
+          exact_srgb(static_cast<double>(half_a.pixels[i][c])) - exact_srgb(static_cast<double>(half_b.pixels[i][c]));
       sum += d * d;
     }
   const double mse = n == 0 ? 0 : sum / (3.0 * static_cast<double>(n)) / 4.0;
