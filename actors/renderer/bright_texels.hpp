@@ -33,7 +33,7 @@ class BrightTexels {
   /// None.
   BrightTexels() = default;
   /// Those of `light` that stand out, and none where light is even enough for rays to find it by chance. Only of opaque
-  /// or masked surfaces that neither emit nor transmit, which is where paths end. Not for the inner loop: reads all
+  /// surfaces that neither emit nor transmit, which is where paths end. Not for the inner loop: reads all
   /// texels.
   BrightTexels(const StoredLight& light, const atlas::TexelMapper& mapper, const LightTransport& transport);
 

@@ -130,7 +130,7 @@ class SceneSurfaces : public TileSurfaces {
     return std::make_shared<SceneTile>(id, world_, stored_);
   }
   [[nodiscard]] std::vector<CoarseRequest> shone_on() const override;
-  [[nodiscard]] std::optional<CoarseRequest> shone_on(std::uint32_t ray) const;
+  [[nodiscard]] std::optional<glm::uvec2> shone_on(std::uint32_t ray) const;
   void find_bright(StoredLight& light) const override {
     light.give_bright(BrightTexels(light, *world_->mapper, *world_->transport));
   }
@@ -141,8 +141,8 @@ class SceneSurfaces : public TileSurfaces {
   std::shared_ptr<const StoredLight> stored_;
 };
 
-// Where a ray from a point of an emitter ends: each has as much light.
-std::optional<CoarseRequest> SceneSurfaces::shone_on(std::uint32_t ray) const {
+// Where a ray from a point of an emitter ends, in texels of the coarse level: each ray has as much light.
+std::optional<glm::uvec2> SceneSurfaces::shone_on(std::uint32_t ray) const {
   Sampler sampler(world_->seed, kEmitterSeed, ray);
   const float pick = sampler.next_1d();
   const EmitterDraw from = world_->transport->lights().draw_emitter(pick, sampler.next_2d());
@@ -151,40 +151,37 @@ std::optional<CoarseRequest> SceneSurfaces::shone_on(std::uint32_t ray) const {
   glm::vec3 tangent, bitangent;
   trace::make_frame(normal, tangent, bitangent);
   const glm::vec3 d = sample_cosine(sampler.next_2d());
-  const glm::vec3 origin = from.position + normal * (kOffEmitter * trace::detail::largest_size(from.position));
+  const float off = kOffEmitter * trace::detail::largest_size(from.position) + trace::detail::kOffsetSmallest;
   trace::Hit hit;
-  if (!world_->transport->rays().closest({origin, 0.0f, tangent * d.x + bitangent * d.y + normal * d.z, 1e30f}, hit))
+  if (!world_->transport->rays().closest(
+          {from.position + normal * off, 0.0f, tangent * d.x + bitangent * d.y + normal * d.z, 1e30f}, hit))
     return std::nullopt;
   const auto& layout = world_->mapper->layout();
   const PatchId patch = layout.patch_of(hit.instance, hit.triangle, hit.front);
   if (patch == kNoPatch) return std::nullopt;
-  const int level = layout.coarse_level();
-  const glm::vec2 at = layout.texel_at(patch, level, layout.patch_uv(hit.instance, hit.triangle, hit.u, hit.v));
-  CoarseRequest texel;
-  texel.tile = layout.tile_at(level, at).index();
-  texel.mask.set(static_cast<int>(at.x) % kTileSize, static_cast<int>(at.y) % kTileSize);
-  return texel;
+  return glm::uvec2(
+      layout.texel_at(patch, layout.coarse_level(), layout.patch_uv(hit.instance, hit.triangle, hit.u, hit.v)));
 }
 
 std::vector<CoarseRequest> SceneSurfaces::shone_on() const {
-  std::vector<CoarseRequest> out;
   const auto& lights = world_->transport->lights();
   // Of other light it is not known what it is beside theirs.
   if (!lights.has_emitters() || lights.has_punctual() || !lights.suns().empty() || world_->scene->sky.emits())
-    return out;
-  std::map<std::uint32_t, std::uint32_t> met;  // texel of the level -> rays
-  for (std::uint32_t i = 0; i < kEmitterRays; ++i) {
-    const auto texel = shone_on(i);
-    if (!texel) continue;
-    std::uint32_t t = 0;
-    while (!texel->mask.test(static_cast<int>(t))) ++t;
-    if (++met[texel->tile * kTileTexels + t] == 1) out.push_back(*texel);
-  }
-  double pairs = 0;
-  for (const auto& [texel, rays] : met) pairs += double{rays - 1.0} * rays;
+    return {};
   const auto& level = world_->mapper->layout().levels.back();
-  const double texels = double{level.width * 1.0} * level.height;
-  if (pairs * texels < kConcentrated * kEmitterRays * (kEmitterRays - 1.0)) out.clear();
+  std::map<std::uint32_t, double> met;  // texel, row-major -> rays
+  for (std::uint32_t ray = 0; ray < kEmitterRays; ++ray)
+    if (const auto at = shone_on(ray)) ++met[at->y * level.width + at->x];
+  double pairs = 0;
+  for (const auto& [texel, rays] : met) pairs += rays * (rays - 1);
+  const double evenly = kEmitterRays * (kEmitterRays - 1.0) / (static_cast<double>(level.width) * level.height);
+  if (pairs < kConcentrated * evenly) return {};
+  std::vector<CoarseRequest> out;
+  for (const auto& [texel, rays] : met) {
+    const std::uint32_t x = texel % level.width, y = texel / level.width;
+    out.push_back({y / kTileSize * level.tiles_x + x / kTileSize, {}});
+    out.back().mask.set(static_cast<int>(x % kTileSize), static_cast<int>(y % kTileSize));
+  }
   return out;
 }
 
