@@ -18,7 +18,7 @@ constexpr float kWorth = 0.125f;      // over the spread of what rays find, squa
 constexpr float kLeastChance = 0.5f;  // less is not worth its time
 constexpr float kLeastLight = 0.25f;  // of what bright texels would send there, if nothing stood between
 constexpr float kWideSpread = 4.0f;
-constexpr float kWorthwhile = 0.75f;      // of receivers with a wide spread
+constexpr float kWorthwhile = 0.85f;      // of what is sent, to receivers with a wide spread
 constexpr std::uint32_t kFirstLook = 16;  // one texel of so many tells whether there is anything to aim at
 constexpr std::size_t kReceivers = 256;
 constexpr float kGroupTexels = 4.0f;  // half the extent of a group to begin with
@@ -86,13 +86,14 @@ void BrightTexels::build(const StoredLight& light, const atlas::TexelMapper& map
   first_.push_back(static_cast<std::uint32_t>(texels_.size()));
 }
 
-// Of receivers all over the scene that face any of them: how many find little by chance.
+// Of what bright texels send to receivers all over the scene: how much goes to those that find it by chance only. Not
+// of the receivers: the outside of a closed room faces a few by the roughness of groups, and is dark.
 float BrightTexels::share_of_wide(const StoredLight& light, const atlas::TexelMapper& mapper,
                                   const LightTransport& transport) const {
   const auto texels = light.texels();
   const auto& level = layout_->levels.back();
   const std::size_t step = std::max(texels.size() / (2 * kReceivers), std::size_t{1}) | 1;  // half are nobody's
-  float sum = 0, receivers = 0;
+  double wide = 0, all = 0;
   for (std::size_t at = step / 2; at < texels.size(); at += step) {
     const auto x = static_cast<int>(at % level.width), y = static_cast<int>(at / level.width);
     const auto tile =
@@ -101,12 +102,12 @@ float BrightTexels::share_of_wide(const StoredLight& light, const atlas::TexelMa
     if (!point) continue;
     const auto surface = trace::make_unbent_surface(transport.rays(), *point);
     const float soft = texels[at].known ? luminance(texels[at].soft) : -1.0f;
-    const float spread = aim(surface.position, surface.normal, soft).spread;
-    if (!(spread > 0)) continue;
-    sum += spread > kWideSpread ? 1.0f : 0.0f;
-    ++receivers;
+    const Aim sent = aim(surface.position, surface.normal, soft);
+    if (!(sent.spread > 0)) continue;
+    all += double{sent.sum};
+    if (sent.spread > kWideSpread) wide += double{sent.sum};
   }
-  return receivers > 0 ? sum / receivers : 0.0f;
+  return all > 0 ? static_cast<float>(wide / all) : 0.0f;
 }
 
 std::vector<BrightTexels::Found> BrightTexels::find(const StoredLight& light, const atlas::TexelMapper& mapper,
