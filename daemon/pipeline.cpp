@@ -54,6 +54,7 @@ std::shared_ptr<const tile_scheduler::CoarseLuma> luma_of(const renderer::Coarse
   for (std::size_t i = 0; i + 2 < picture.rgb.size(); i += 3)
     out->luma.push_back(static_cast<std::uint8_t>(
         (13933 * picture.rgb[i] + 46871 * picture.rgb[i + 1] + 4732 * picture.rgb[i + 2] + 32768) >> 16));  // BT.709
+  out->errors = picture.errors;
   return out;
 }
 

@@ -10,6 +10,7 @@ namespace darm::renderer {
 
 namespace {
 
+constexpr float kUndrawnError = 0.25f;        // of a tile of which nothing is known, as of what is filled
 constexpr std::uint32_t kHurriedPasses = 16;  // of a job: a tile full of texels is some tens of milliseconds
 
 // One job a tile: a tile has one writer.
@@ -115,18 +116,25 @@ CoarseCanvas::CoarseCanvas(LevelTiles tiles, std::uint32_t version)
   picture_->width = tiles.x * kTileSize;
   picture_->height = tiles.y * kTileSize;
   picture_->rgb.resize(std::size_t{picture_->width} * picture_->height * 3);
+  picture_->errors.assign(drawn_.size(), kUndrawnError);
 }
 
-void CoarseCanvas::put(std::uint32_t tile_index, const TileImage& image) {
+void CoarseCanvas::put(std::uint32_t tile_index, const TileImage& image, float error) {
+  copy(tile_index, image);
+  picture_->errors[tile_index] = error;
+  drawn_[tile_index] = 1;
+}
+
+void CoarseCanvas::copy(std::uint32_t tile_index, const TileImage& image) {
   const std::size_t x = tile_index % tiles_.x * kTileSize;
   const std::size_t y = tile_index / tiles_.x * kTileSize;
   for (std::size_t row = 0; row < kTileSize; ++row)
     std::memcpy(&picture_->rgb[((y + row) * picture_->width + x) * 3], &image.rgb[((row + 1) * kSlotSize + 1) * 3],
                 kTileSize * 3);
-  drawn_[tile_index] = 1;
 }
 
-std::shared_ptr<const CoarsePicture> CoarseCanvas::finish() {
+std::shared_ptr<const CoarsePicture> CoarseCanvas::finish(float least_error) {
+  for (float& error : picture_->errors) error = std::max(error, least_error);
   std::vector<std::array<std::uint8_t, 3>> colour(drawn_.size());
   std::vector<std::uint32_t> queue;
   for (std::uint32_t t = 0; t < drawn_.size(); ++t) {
@@ -149,7 +157,8 @@ std::shared_ptr<const CoarsePicture> CoarseCanvas::finish() {
       if (!to || drawn_[to->index()]) continue;
       colour[to->index()] = colour[from.index()];
       for (std::size_t i = 0; i < flat.rgb.size(); ++i) flat.rgb[i] = colour[to->index()][i % 3];
-      put(to->index(), flat);
+      copy(to->index(), flat);
+      drawn_[to->index()] = 1;
       queue.push_back(to->index());
     }
   }

@@ -18,6 +18,8 @@ struct CoarsePicture {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<std::uint8_t> rgb;
+  /// Of each of its tiles, row-major: RMS display error expected of its light, 0..1.
+  std::vector<float> errors;
 };
 
 enum class CoarseDue : std::uint8_t {
@@ -86,11 +88,15 @@ class CoarseRounds {
 class CoarseCanvas {
  public:
   CoarseCanvas(LevelTiles tiles, std::uint32_t version);
-  void put(std::uint32_t tile_index, const TileImage& image);
-  /// Gives tiles that were not put the mean brightness of the nearest one that was, as a grey.
-  [[nodiscard]] std::shared_ptr<const CoarsePicture> finish();
+  /// `error`: as TilePicture has it.
+  void put(std::uint32_t tile_index, const TileImage& image, float error);
+  /// Gives tiles that were not put the mean brightness of the nearest one that was, as a grey. No tile's error is under
+  /// `least_error`.
+  [[nodiscard]] std::shared_ptr<const CoarsePicture> finish(float least_error = 0);
 
  private:
+  void copy(std::uint32_t tile_index, const TileImage& image);
+
   LevelTiles tiles_;
   std::shared_ptr<CoarsePicture> picture_;
   std::vector<std::uint8_t> drawn_;

@@ -29,7 +29,7 @@ constexpr float kFirstTolerance = 0.02f;  // for the first picture
 constexpr float kTolerance = 0.005f;
 
 /// Bumped whenever the same light would be drawn in another way: stored pictures are then not used.
-constexpr std::uint64_t kDisplayVersion = 7;
+constexpr std::uint64_t kDisplayVersion = 8;
 
 // What a stored picture depends on beside its light.
 std::uint64_t picture_tag_of(const DisplayOptions& display) {
@@ -401,7 +401,9 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
   if (job.recall) {
     if (const auto stored = store.picture(job.tile, shared.picture_tag)) picture = from_stored(*stored);
   } else {
-    picture = display.draw(job.tile, shared.level_of(job.tile), job.mask, job.coarse ? Unlit::kGrey : Unlit::kAsBeside);
+    // CoarseTex is seen where it is lit: before its first round that is what views asked for.
+    const TexelMask mask = job.coarse ? lit_texels(store, job.tile) : job.mask;
+    picture = display.draw(job.tile, shared.level_of(job.tile), mask, job.coarse ? Unlit::kGrey : Unlit::kAsBeside);
     if (picture && job.keep) store.put_picture(job.tile, shared.picture_tag, to_stored(*picture));
   }
   if (job.coarse) {
@@ -410,7 +412,7 @@ void RendererActor::picture_one(Shared& shared, Batch& batch, std::size_t index)
       shared.divided.forget(job.tile.index(), texels, *shared.parts.surfaces);
       batch.light->put(job.tile.index(), texels);
     }
-    if (picture && batch.canvas) batch.canvas->put(job.tile.index(), *picture->image);
+    if (picture && batch.canvas) batch.canvas->put(job.tile.index(), *picture->image, picture->error);
     if (picture && picture->samples > 0) batch.results[index].lost_share = picture->lost_share;
   } else {
     batch.results[index].picture = std::move(picture);
@@ -426,7 +428,8 @@ float RendererActor::mean_lost_share(const Batch& batch) {
 
 void RendererActor::finish_pictures() {
   send_pictures();
-  if (batch_->canvas && shared_->parts.coarse) shared_->parts.coarse(batch_->canvas->finish());
+  if (batch_->canvas && shared_->parts.coarse)
+    shared_->parts.coarse(batch_->canvas->finish(unsettled_until_ ? kUnsettledError : 0.0f));
   if (batch_->light)
     begin_stored_light();
   else

@@ -134,6 +134,7 @@ struct CoarseLuma {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<std::uint8_t> luma;
+  std::vector<float> errors{};  ///< of each of its tiles, row-major: RMS display error expected of its light, 0..1
 };
 
 /// The coarse level has a new picture.

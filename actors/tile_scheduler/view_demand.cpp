@@ -187,10 +187,11 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
 }
 
 ErrorOptions error_options(const ViewTone& tone) {
-  constexpr float kEnough = 0.15f;  // as far from black and from white noise has all the room it takes
+  constexpr float kCoded = 0.0175f;  // as LossOptions::coarse_error
+  constexpr float kEnough = 0.15f;   // as far from black and from white noise has all the room it takes
   ErrorOptions options;
   const float room = std::min({1.0f, tone.brightness / kEnough, tone.headroom / kEnough});
-  options.coarse_tex *= room;
+  options.coarse_tex = std::hypot(tone.coarse_light, kCoded * room);
   options.variety = tone.variety;
   return options;
 }

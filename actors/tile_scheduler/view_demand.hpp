@@ -58,8 +58,7 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
                      const AllocationOptions& options);
 
 struct ErrorOptions {
-  /// RMS display error of CoarseTex beside its coarseness: light of a sample or few a texel (its first picture of the
-  /// atrium is at 28.6 dB), coded in 300 kB.
+  /// RMS display error of CoarseTex beside its coarseness: of its light, and of being coded in 300 kB.
   float coarse_tex = 0.03f;
   float unlit = 0.25f;  ///< of a sample that nothing serves yet
   float variety = 1;    ///< ViewTone::variety: what coarser texels lose is as much less

@@ -14,9 +14,14 @@ constexpr double kUsualStep = 0.045;    // RMS difference of neighbours in the p
 
 double linear(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
 
+double error_at(const CoarseLuma& coarse, std::uint32_t x, std::uint32_t y) {
+  const std::size_t tile = std::size_t{y / kTileSize} * (coarse.width / kTileSize) + x / kTileSize;
+  return double{tile < coarse.errors.size() ? coarse.errors[tile] : ViewTone{}.coarse_light};
+}
+
 // Sums over taps.
 struct Sums {
-  double looked = 0, linear = 0, squares = 0, headroom = 0, steps = 0;
+  double looked = 0, linear = 0, squares = 0, headroom = 0, steps = 0, errors = 0;
 
   void look(const CoarseLuma& coarse, std::uint32_t x, std::uint32_t y) {
     const auto at = [&](std::uint32_t i, std::uint32_t j) {
@@ -30,6 +35,8 @@ struct Sums {
     squares += here * here;
     headroom += (1 - here) * (1 - here);
     steps += 0.5 * (right * right + down * down);
+    const double error = error_at(coarse, x, y);
+    errors += error * error;
   }
 };
 
@@ -48,6 +55,7 @@ ViewTone tone_of(const VisibleSet& view, const CoarseLuma* coarse) {
     tone.surroundings = std::min(1.0f, static_cast<float>(sums.linear / sums.looked) / diffuse);
   tone.brightness = static_cast<float>(std::sqrt(sums.squares / sums.looked));
   tone.headroom = static_cast<float>(std::sqrt(sums.headroom / sums.looked));
+  tone.coarse_light = static_cast<float>(std::sqrt(sums.errors / sums.looked));
   tone.variety = static_cast<float>(std::sqrt(std::min(1.0, std::sqrt(sums.steps / sums.looked) / kUsualStep)));
   return tone;
 }

@@ -17,6 +17,7 @@ struct ViewTone {
   /// Root of: RMS difference of neighbouring texels of CoarseTex, display values, over that of a usual picture; at most
   /// 1. The root, because CoarseTex does not show how sharp its edges are.
   float variety = 1;
+  float coarse_light = 0.025f;  ///< RMS display error of CoarseTex's light there, 0..1
 };
 
 /// Looks at some thousand of the view's taps. The usual one without CoarseTex or taps.

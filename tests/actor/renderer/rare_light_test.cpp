@@ -73,7 +73,7 @@ class RareLightTest : public ::testing::Test {
     parts.options.coarse_share = 0.5f;  // a round takes no longer than some samples of what is seen, however fast it is
     parts.options.schedule.max_samples = 16;
     parts.scheduler = system_->spawn<Listener>("tile_scheduler", 64, told_);
-    parts.coarse = [](std::shared_ptr<const CoarsePicture>) {};
+    parts.coarse = [this](std::shared_ptr<const CoarsePicture> p) { coarse_errors_.push_back(p->errors); };
     parts.metrics = &metrics_;
     auto renderer = system_->spawn<RendererActor>("renderer", 1024, parts);
     std::vector<TileRequest> requests;
@@ -100,6 +100,7 @@ class RareLightTest : public ::testing::Test {
   std::map<TileId, std::map<std::uint32_t, int>> asked_;  // soft samples of texel 0
   std::vector<TileId> order_;                             // of the first samples
   std::shared_ptr<Told> told_ = std::make_shared<Told>();
+  std::vector<std::vector<float>> coarse_errors_;  // of each picture of the coarse level
   CountingMetrics metrics_;
   std::unique_ptr<runtime::DeterministicSystem> system_;
 };
@@ -114,6 +115,8 @@ TEST_F(RareLightTest, samples_from_before_it_is_known_are_replaced_and_pictures_
   }
   EXPECT_TRUE(std::ranges::any_of(told_->tiles, [](const auto& t) { return t.error == 0.25f; }));
   EXPECT_LT(told_->tiles.back().error, 0.1f);
+  EXPECT_TRUE(std::ranges::any_of(coarse_errors_, [](const auto& e) { return std::ranges::min(e) >= 0.25f; }));
+  EXPECT_LT(std::ranges::max(coarse_errors_.back()), 0.25f);
 }
 
 TEST_F(RareLightTest, what_is_known_from_the_start_is_lit_first_and_nothing_is_replaced) {

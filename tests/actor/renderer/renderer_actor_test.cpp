@@ -215,7 +215,10 @@ TEST_F(RendererActorTest, coarse_level_is_lit_at_start_and_gets_better) {
     EXPECT_EQ(coarse_[i]->width, 60u);
     EXPECT_EQ(coarse_[i]->rgb.size(), 60u * 60 * 3);
     for (const auto v : coarse_[i]->rgb) ASSERT_GT(v, 0);
+    ASSERT_EQ(coarse_[i]->errors.size(), 4u);
+    for (const float e : coarse_[i]->errors) EXPECT_GT(e, 0);
   }
+  for (std::size_t t = 0; t < 4; ++t) EXPECT_LT(coarse_.back()->errors[t], coarse_.front()->errors[t]);
   for (std::uint32_t t = 0; t < 4; ++t) EXPECT_EQ(samples_[TileId(1, t)].size(), 900u * 4);
 }
 
@@ -294,6 +297,7 @@ TEST_F(RendererActorTest, a_restart_shows_the_coarse_level_at_once_and_goes_on_w
   system_->run_until_idle();
   ASSERT_GE(coarse_.size(), 2u);
   EXPECT_EQ(coarse_.front()->rgb, last->rgb);
+  EXPECT_EQ(coarse_.front()->errors, last->errors);
   EXPECT_EQ(samples_[TileId(1, 0)].size(), 900u);  // one round, not five
 }
 

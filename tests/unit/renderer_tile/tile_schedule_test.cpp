@@ -312,7 +312,7 @@ TEST(CoarseCanvasTest, tiles_without_light_are_as_bright_as_the_nearest_and_grey
   CoarseCanvas canvas(LevelTiles{3, 1}, 7);
   TileImage image{};
   for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = i % 3 == 1 ? 90 : 0;  // green
-  canvas.put(2, image);
+  canvas.put(2, image, 0.01f);
   const auto picture = canvas.finish();
   EXPECT_EQ(picture->version, 7u);
   EXPECT_EQ(picture->width, 90u);
@@ -321,6 +321,14 @@ TEST(CoarseCanvasTest, tiles_without_light_are_as_bright_as_the_nearest_and_grey
     const bool put = i / 3 % 90 >= 60;
     ASSERT_EQ(picture->rgb[i], put ? (i % 3 == 1 ? 90 : 0) : 64) << i;
   }
+}
+
+TEST(CoarseCanvasTest, tiles_have_the_errors_they_were_drawn_with_and_those_that_were_not_a_quarter) {
+  CoarseCanvas canvas(LevelTiles{3, 1}, 1);
+  canvas.put(1, TileImage{}, 0.01f);
+  canvas.put(2, TileImage{}, 0.5f);
+  EXPECT_EQ(canvas.finish()->errors, (std::vector<float>{0.25f, 0.01f, 0.5f}));
+  EXPECT_EQ(canvas.finish(0.125f)->errors, (std::vector<float>{0.25f, 0.125f, 0.5f})) << "light may be unsettled";
 }
 
 TEST_F(TileScheduleTest, stored_tiles_are_asked_for_their_picture_once) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 
 #include "actors/scene/view_materials.hpp"
@@ -11,7 +12,7 @@
 namespace darm::tile_scheduler {
 namespace {
 
-constexpr std::uint32_t kSide = 64;
+constexpr std::uint32_t kSide = 2 * kTileSize;
 
 CoarseLuma picture_of(const std::function<int(std::uint32_t x, std::uint32_t y)>& code) {
   CoarseLuma out{kSide, kSide, {}};
@@ -44,13 +45,25 @@ TEST(ViewTone, BlackAndWhiteHaveNoRoomForErrors) {
   EXPECT_EQ(black.variety, 0.0f);
   EXPECT_EQ(black.brightness, 0.0f);
   EXPECT_EQ(omitted_error(view, black), 0.0f) << "no light, no reflection";
-  EXPECT_EQ(error_options(black).coarse_tex, 0.0f);
+  EXPECT_EQ(error_options(black).coarse_tex, black.coarse_light);
   const auto bright = picture_of([](auto, auto) { return 255; });
   const auto white = tone_of(view, &bright);
   EXPECT_EQ(white.headroom, 0.0f);
   EXPECT_EQ(white.variety, 0.0f);
   EXPECT_EQ(omitted_error(view, white), 0.0f);
-  EXPECT_EQ(error_options(white).coarse_tex, 0.0f);
+  EXPECT_EQ(error_options(white).coarse_tex, white.coarse_light);
+}
+
+TEST(ViewTone, CoarseTexIsOffByWhatItsTilesWereDrawnWithWhereTheViewLooks) {
+  auto picture = picture_of([](auto, auto) { return 128; });
+  const auto coarse_tex = [&] { return error_options(tone_of(view_of_all(), &picture)).coarse_tex; };
+  picture.errors.assign(4, 0.0f);
+  const float coded = coarse_tex();
+  EXPECT_GT(coded, 0.0f) << "a still picture of few bytes is not what was drawn";
+  picture.errors.assign(4, 0.2f);
+  EXPECT_NEAR(coarse_tex(), std::hypot(0.2f, coded), 1e-6f);
+  picture.errors[1] = picture.errors[2] = picture.errors[3] = 0;
+  EXPECT_NEAR(coarse_tex(), std::hypot(0.1f, coded), 1e-6f) << "a quarter of what is seen";
 }
 
 TEST(ViewTone, APlainGreyLosesNothingWhereItIsCoarser) {
@@ -59,7 +72,7 @@ TEST(ViewTone, APlainGreyLosesNothingWhereItIsCoarser) {
   const auto checks = picture_of([](auto x, auto y) { return (x + y) % 2 == 0 ? 90 : 160; });
   EXPECT_EQ(tone_of(view, &plain).variety, 0.0f);
   EXPECT_EQ(tone_of(view, &checks).variety, 1.0f);
-  EXPECT_EQ(error_options(tone_of(view, &plain)).coarse_tex, ErrorOptions{}.coarse_tex) << "noise it may have";
+  EXPECT_NEAR(error_options(tone_of(view, &plain)).coarse_tex, ErrorOptions{}.coarse_tex, 1e-3f) << "noise it may have";
   const std::vector<WeightedChain> chains{{{{TileId(0, 1), TileId(1, 2), kNoTile, kNoTile}}, 1.0f}};
   const std::vector<std::uint8_t> served{1};
   StoredImage stored;
