@@ -27,8 +27,8 @@ IrradianceFilter::IrradianceFilter() {
   }
 }
 
-FitCentres IrradianceFilter::centres_at(const FilterWindow& w, std::size_t first) const {
-  return {load(&w.patch[first]), load(&statistics_.mean()[first]), load(&statistics_.variance()[first]),
+FitCentres IrradianceFilter::centres_at(const std::vector<std::uint32_t>& stretches, std::size_t first) const {
+  return {load(&stretches[first]), load(&statistics_.mean()[first]), load(&statistics_.variance()[first]),
           load(&first_[first])};
 }
 
@@ -61,19 +61,20 @@ void IrradianceFilter::find_lit(const FilterWindow& w) {
 }
 
 void IrradianceFilter::filter_rows(const FilterWindow& w) {
+  const auto& stretches = statistics_.row_stretches();
   rows_.resize(static_cast<std::size_t>(w.size * kBlocks));
   filled_.assign(rows_.size(), 0);
   for (int y = 0; y < w.size; ++y)
     for (int b = 0; b < kBlocks; ++b) {
       const auto first = static_cast<std::size_t>(y * w.size + w.radius + b * kLanes);
       const int reach = std::min(reach_of(first), w.radius);
-      LineFits fits(centres_at(w, first), with_slope_);
+      LineFits fits(centres_at(stretches, first), with_slope_);
       bool any = false;
       fits.along(reach, [&](int distance) {
         const std::size_t q = first + static_cast<std::size_t>(distance);
         if (lit_[q] == 0) return;
         any = true;
-        fits.add({load(&w.patch[q]),
+        fits.add({load(&stretches[q]),
                   load(&statistics_.mean()[q]),
                   load(&statistics_.variance()[q]),
                   load(&w.count[q]),
@@ -88,12 +89,13 @@ void IrradianceFilter::filter_rows(const FilterWindow& w) {
 }
 
 void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<FilteredTexel>& out) {
+  const auto& stretches = statistics_.column_stretches();
   Fitted fitted;
   for (int y = 0; y < kSlotSize; ++y)
     for (int b = 0; b < kBlocks; ++b) {
       const auto first = static_cast<std::size_t>((y + w.radius) * w.size + w.radius + b * kLanes);
       const int reach = std::min(reach_of(first), w.radius);
-      LineFits fits(centres_at(w, first), with_slope_);
+      LineFits fits(centres_at(stretches, first), with_slope_);
       bool any = false;
       fits.along(reach, [&](int distance) {
         const int v = y + w.radius + distance;
@@ -101,7 +103,7 @@ void IrradianceFilter::filter_columns(const FilterWindow& w, std::vector<Filtere
         any = true;
         const auto q = static_cast<std::size_t>(v * w.size + w.radius + b * kLanes);
         const Fitted& row = block(v, b);
-        fits.add({load(&w.patch[q]), load(&statistics_.mean()[q]), load(&statistics_.variance()[q]), row.weight,
+        fits.add({load(&stretches[q]), load(&statistics_.mean()[q]), load(&statistics_.variance()[q]), row.weight,
                   row.value, row.noise},
                  static_cast<float>(distance));
       });

@@ -45,7 +45,7 @@ class IrradianceFilter {
   void filter_columns(const FilterWindow& window, std::vector<FilteredTexel>& out);
   [[nodiscard]] float smear_of(std::size_t at, const FilteredTexel& texel, float weight) const;
   [[nodiscard]] int reach_of(std::size_t first) const;
-  [[nodiscard]] FitCentres centres_at(const FilterWindow& window, std::size_t first) const;
+  [[nodiscard]] FitCentres centres_at(const std::vector<std::uint32_t>& stretches, std::size_t first) const;
   [[nodiscard]] Fitted& block(int y, int number) { return rows_[static_cast<std::size_t>(y * kBlocks + number)]; }
 
   WindowStatistics statistics_;

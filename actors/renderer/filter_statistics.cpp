@@ -63,6 +63,30 @@ float WindowStatistics::held(int area_class, std::size_t at) const {
   return std::max((side(0) + side(1)) * (side(2) + side(3)), kLeastHeld);
 }
 
+// In a row of the widest window, at most. All patches are in CoarseTex, which has 2048 texels a side: under 2^22 of
+// them, and names of their rings' stretches under 2^29.
+constexpr std::uint32_t kStretches = 32;
+
+bool WindowStatistics::name_stretches(const FilterWindow& w) {
+  row_stretches_ = w.patch;
+  column_stretches_ = w.patch;
+  if (std::ranges::all_of(w.walls, [](std::uint8_t v) { return v == 0; })) return false;
+  std::array<std::uint32_t, kSlotSize + 2 * kMaxFilterRadius> above{};  // walls in each column so far
+  for (int y = 0; y < w.size; ++y) {
+    std::uint32_t before = 0;
+    for (int x = 0; x < w.size; ++x) {
+      const auto at = static_cast<std::size_t>(y * w.size + x);
+      auto& over = above[static_cast<std::size_t>(x)];
+      if ((w.walls[at] & kWallBefore) != 0) ++before;
+      if ((w.walls[at] & kWallAbove) != 0) ++over;
+      if (w.patch[at] == kNoTexelPatch) continue;
+      row_stretches_[at] = w.patch[at] * kStretches + std::min(before, kStretches - 1);
+      column_stretches_[at] = w.patch[at] * kStretches + std::min(over, kStretches - 1);
+    }
+  }
+  return true;
+}
+
 // What each texel has by itself, in differences to a pivot: no cancellation.
 void WindowStatistics::measure(const FilterWindow& w) {
   const auto n = w.count.size();
@@ -116,7 +140,7 @@ float WindowStatistics::spread_of(std::size_t i, bool first_pass) const {
   return trust * inside + (1.0f - trust) * between;
 }
 
-// Names each texel by patch and ring: gutter, outermost texels, those beside them, all others.
+// Names each texel by stretch and ring: gutter, outermost texels, those beside them, all others.
 void WindowStatistics::ring(const FilterWindow& w) {
   const int size = w.size;
   const auto n = w.count.size();
@@ -131,7 +155,8 @@ void WindowStatistics::ring(const FilterWindow& w) {
         for (int x = begin; x < end; ++x) depth[x] = own[x] == other[x] ? depth[x] : std::uint8_t{0};
       }
   // One ring further in at each round: rows, then columns.
-  rings_.resize(n);
+  row_rings_.resize(n);
+  column_rings_.resize(n);
   for (std::uint8_t ring = 1; ring + 1 < kRings; ++ring) {
     least_ = depth_;
     for (int y = 0; y < size; ++y) {
@@ -151,8 +176,11 @@ void WindowStatistics::ring(const FilterWindow& w) {
       }
     }
   }
-  for (std::size_t i = 0; i < n; ++i)
-    rings_[i] = w.patch[i] == kNoTexelPatch ? kNoTexelPatch : w.patch[i] * kRings + depth_[i];
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool nobody = w.patch[i] == kNoTexelPatch;
+    row_rings_[i] = nobody ? kNoTexelPatch : row_stretches_[i] * kRings + depth_[i];
+    column_rings_[i] = nobody ? kNoTexelPatch : column_stretches_[i] * kRings + depth_[i];
+  }
 }
 
 void WindowStatistics::compare_neighbours(const FilterWindow& w) {
@@ -210,7 +238,8 @@ void WindowStatistics::compare_by(const FilterWindow& w, bool first_pass) {
   }
 }
 
-void WindowStatistics::widen(const FilterWindow& w, float target) {
+// A wall is no border here: light changes so much beside it that a wider filter would smear more than it evens out.
+void WindowStatistics::widen(const FilterWindow& w, PatchSums& stretches, float target) {
   const auto n = w.count.size();
   by_patch_.reach(reach_);
   noise_.assign(n, 0.0f);
@@ -221,8 +250,8 @@ void WindowStatistics::widen(const FilterWindow& w, float target) {
     tinted_[i] = 1;
     noise_[i] = slope * slope * spread_[i];
   }
-  by_patch_.sum(noise_, kNoiseRadius);
-  by_patch_.sum(tinted_, kNoiseRadius);
+  stretches.sum(noise_, kNoiseRadius);
+  stretches.sum(tinted_, kNoiseRadius);
   for (std::size_t i = 0; i < n; ++i) {
     if (!(wide_count_[i] > 0)) continue;
     float area = target / std::max(w.count[i], wide_count_[i]);
@@ -237,18 +266,21 @@ void WindowStatistics::widen(const FilterWindow& w, float target) {
 void WindowStatistics::run(const FilterWindow& w, float target) {
   const auto n = w.count.size();
   measure(w);
-  by_patch_.connect(w.patch, w.size, kNoTexelPatch);
+  by_patch_.connect(w.patch, w.patch, w.size, kNoTexelPatch);
+  const bool walled = name_stretches(w);
+  if (walled) by_stretch_.connect(row_stretches_, column_stretches_, w.size, kNoTexelPatch);
+  PatchSums& stretches = walled ? by_stretch_ : by_patch_;
   area_class_.assign(n, 0);
   widest_class_ = 0;
   evenness_ = 1;
   if (w.first_pass()) {
-    sum_around(by_patch_, pool_radius(texel_samples_), false);
+    sum_around(stretches, pool_radius(texel_samples_), false);
     compare_by(w, true);
     for (std::size_t i = 0; i < n; ++i) area_class_[i] = class_of(target / std::max(w.count[i], 1.0f));
     widest_class_ = n > 0 ? *std::max_element(area_class_.begin(), area_class_.end()) : 0;
     return;
   }
-  sum_around(by_patch_, kNoiseRadius, true);
+  sum_around(stretches, kNoiseRadius, true);
   wide_.assign(n, 0.0f);
   wide_count_.assign(n, 0.0f);
   for (std::size_t i = 0; i < n; ++i) {
@@ -258,10 +290,10 @@ void WindowStatistics::run(const FilterWindow& w, float target) {
   }
   compare_neighbours(w);
   ring(w);
-  by_ring_.connect(rings_, w.size, kNoTexelPatch);
+  by_ring_.connect(row_rings_, column_rings_, w.size, kNoTexelPatch);
   sum_around(by_ring_, pool_radius(texel_samples_), true);
   compare_by(w, false);
-  widen(w, target);
+  widen(w, stretches, target);
 }
 
 }  // namespace darm::renderer

@@ -23,6 +23,9 @@ class WindowStatistics {
   /// square. A first pass (FilterWindow::first_pass) says too little of its noise for that, and is taken as usual.
   void run(const FilterWindow& window, float target);
 
+  /// Texels of a row (column) that have the same name are of one patch, and nothing stands between them.
+  [[nodiscard]] const std::vector<std::uint32_t>& row_stretches() const { return row_stretches_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& column_stretches() const { return column_stretches_; }
   /// Mean of grey over all samples of the same patch around each texel, and the variance of that mean: what texels are
   /// compared by. No samples: variance 1e30, like everything.
   [[nodiscard]] const std::vector<float>& mean() const { return mean_; }
@@ -45,13 +48,14 @@ class WindowStatistics {
     std::vector<float> samples, sum, squares;  // of differences to a pivot
     std::vector<float> within, freedom;        // inside of texels alone
   };
+  bool name_stretches(const FilterWindow& window);  // false: no walls, and they are the patches
   void measure(const FilterWindow& window);
   void sum_around(PatchSums& patches, int radius, bool within);
   [[nodiscard]] float spread_of(std::size_t at, bool first_pass) const;
   void ring(const FilterWindow& window);
   void compare_neighbours(const FilterWindow& window);
   void compare_by(const FilterWindow& window, bool first_pass);
-  void widen(const FilterWindow& window, float target);
+  void widen(const FilterWindow& window, PatchSums& stretches, float target);
   [[nodiscard]] float held(int area_class, std::size_t at) const;
 
   float pivot_ = 0;
@@ -59,9 +63,10 @@ class WindowStatistics {
   float evenness_ = 1;
   float texel_samples_ = 0;  // mean over the patches' texels
   int widest_class_ = 0;
-  PatchSums by_patch_, by_ring_;
+  PatchSums by_patch_, by_stretch_, by_ring_;
   Sums own_, around_;
-  std::vector<std::uint32_t> rings_;
+  std::vector<std::uint32_t> row_stretches_, column_stretches_;
+  std::vector<std::uint32_t> row_rings_, column_rings_;
   std::vector<std::uint8_t> depth_, least_;
   std::array<std::vector<float>, 4> reach_;
   std::vector<float> mean_, variance_, spread_, inside_, wide_, wide_count_, noise_, tinted_;

@@ -19,12 +19,17 @@ inline constexpr float kFirstPassSamples = 2;
 /// FilterWindow::patch of a texel that no patch owns.
 inline constexpr std::uint32_t kNoTexelPatch = 0xffffffffu;
 
+/// FilterWindow::walls: something stands between the texel and that before it in its row, or above it in its column.
+inline constexpr std::uint8_t kWallBefore = 1;
+inline constexpr std::uint8_t kWallAbove = 2;
+
 /// A square window of texels with a margin of `radius` around the 32x32 that are filtered. Row-major, one value a
 /// texel. Texels with count 0 give nothing, but are given what the others of their patch (kNoTexelPatch: none) have.
 struct FilterWindow {
   int radius = 0;
   int size = 0;  ///< 32 + 2 * radius
   std::vector<std::uint32_t> patch;
+  std::vector<std::uint8_t> walls;               ///< kWallBefore, kWallAbove or both: between texels of the window
   std::vector<float> count;                      ///< samples
   std::array<std::vector<float>, 3> irradiance;  ///< soft light of a white surface
   std::vector<float> grey;                       ///< its luminance
@@ -37,6 +42,7 @@ struct FilterWindow {
     size = kSlotSize + 2 * radius;
     const auto n = static_cast<std::size_t>(size * size);
     patch.assign(n, kNoTexelPatch);
+    walls.assign(n, 0);
     for (auto* plane : {&count, &grey, &grey_m2, &tint, &floor}) plane->assign(n, 0.0f);
     for (auto& plane : irradiance) plane.assign(n, 0.0f);
   }

@@ -34,7 +34,7 @@ inline Lanes likeness(Lanes difference, Lanes variance) {
 
 /// What the four are compared by, and the Gaussian each has: its value at distance 1.
 struct FitCentres {
-  LaneNames patch;
+  LaneNames stretch;
   Lanes mean;
   Lanes variance;
   Lanes first;
@@ -42,7 +42,7 @@ struct FitCentres {
 
 /// The texels at one distance of those. Values of weight 0 must be finite.
 struct FitTexels {
-  LaneNames patch;
+  LaneNames stretch;
   Lanes mean;      ///< what they are compared by
   Lanes variance;  ///< of that
   Lanes weight;
@@ -105,7 +105,7 @@ class LineFits {
 inline void LineFits::add(const FitTexels& texels, float distance) {
   const Lanes alike = likeness(texels.mean - centres_.mean, texels.variance + centres_.variance);
   const Lanes all = gaussian_ * alike * texels.weight;
-  const Lanes weight = texels.patch == centres_.patch ? all : Lanes{};
+  const Lanes weight = texels.stretch == centres_.stretch ? all : Lanes{};
   const Lanes noise = weight * weight * texels.noise;
   weight_ += weight;
   noise_ += noise;

@@ -19,17 +19,19 @@ int steps_of(int radius) { return radius <= 1 ? 1 : radius <= 3 ? 2 : 3; }
 
 }  // namespace
 
-void PatchSums::connect(const std::vector<std::uint32_t>& key, int size, std::uint32_t nobody) {
+void PatchSums::connect(const std::vector<std::uint32_t>& in_rows, const std::vector<std::uint32_t>& in_columns,
+                        int size, std::uint32_t nobody) {
   size_ = size;
   for (auto& links : row_links_) links.assign(static_cast<std::size_t>(size * kStride), 0.0f);
-  for (auto& links : column_links_) links.assign(key.size(), 0.0f);
+  for (auto& links : column_links_) links.assign(in_columns.size(), 0.0f);
   for (int y = 0; y < size; ++y) {
-    const std::uint32_t* k = &key[static_cast<std::size_t>(y * size)];
+    const std::uint32_t* r = &in_rows[static_cast<std::size_t>(y * size)];
+    const std::uint32_t* c = &in_columns[static_cast<std::size_t>(y * size)];
     float* row = &row_links_[0][static_cast<std::size_t>(y * kStride + kPad)];
     float* column = &column_links_[0][static_cast<std::size_t>(y * size)];
-    for (int x = 0; x + 1 < size; ++x) row[x] = k[x] == k[x + 1] && k[x] != nobody ? 1.0f : 0.0f;
+    for (int x = 0; x + 1 < size; ++x) row[x] = r[x] == r[x + 1] && r[x] != nobody ? 1.0f : 0.0f;
     if (y + 1 < size)
-      for (int x = 0; x < size; ++x) column[x] = k[x] == k[x + size] && k[x] != nobody ? 1.0f : 0.0f;
+      for (int x = 0; x < size; ++x) column[x] = c[x] == c[x + size] && c[x] != nobody ? 1.0f : 0.0f;
   }
   for (std::size_t step = 1; step < kSteps; ++step) {
     const int half = 1 << (step - 1);

@@ -17,8 +17,10 @@ inline constexpr int kMaxSumRadius = 7;
 /// scratch memory: one per thread.
 class PatchSums {
  public:
-  /// `key`: one a texel of a square `size` wide, row-major; `nobody` belongs with nothing, not even its like.
-  void connect(const std::vector<std::uint32_t>& key, int size, std::uint32_t nobody);
+  /// Keys, one a texel of a square `size` wide, row-major: one for what belongs together in rows, one in columns.
+  /// `nobody` belongs with nothing, not even its like.
+  void connect(const std::vector<std::uint32_t>& in_rows, const std::vector<std::uint32_t>& in_columns, int size,
+               std::uint32_t nobody);
 
   /// Replaces each value of `plane` (size * size, finite) by the sum over the rows of its column, of what their texels
   /// reach in their rows: a square, but for patches that wind. `radius`: 1, 3 or 7.

@@ -66,18 +66,13 @@ constexpr float kSure = 0.25f;
 constexpr float kFewSamples = 8;
 constexpr float kLoneSample = 0.1f;  // variance of one sharp sample over its square
 
-// Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
-struct Step {
-  int tile;
-  int texel;
-};
-Step step_of(int coordinate) {
+}  // namespace
+
+TileDisplay::Step TileDisplay::step_of(int coordinate) {
   if (coordinate < 0) return {0, coordinate + kTileSize};
   if (coordinate >= kTileSize) return {2, coordinate - kTileSize};
   return {1, coordinate};
 }
-
-}  // namespace
 
 struct SlotColours {
   SlotFill<3> fill;
@@ -190,9 +185,27 @@ void TileDisplay::share_out() {
 // Around the window, of the nine tiles.
 int TileDisplay::margin_of_window() const { return kTileSize - 1 - window_.radius; }
 
+// A tile knows of walls on its border with the next as far as they stand on its own side.
+std::uint8_t TileDisplay::walls_at(const Step& row, const Step& column) const {
+  const auto bit_of = [&](int down, int right, bool in_row, int line, int bit) {
+    const int y = row.tile + down, x = column.tile + right;
+    if (x < 0 || y < 0) return false;
+    const auto& facts = around_[static_cast<std::size_t>(y * 3 + x)].facts;
+    if (!facts) return false;
+    const auto& lines = in_row ? facts->walls.rows : facts->walls.columns;
+    return (lines[static_cast<std::size_t>(line)] >> bit & 1u) != 0;
+  };
+  const bool before =
+      bit_of(0, 0, true, row.texel, column.texel) || (column.texel == 0 && bit_of(0, -1, true, row.texel, kTileSize));
+  const bool above =
+      bit_of(0, 0, false, column.texel, row.texel) || (row.texel == 0 && bit_of(-1, 0, false, column.texel, kTileSize));
+  return static_cast<std::uint8_t>((before ? kWallBefore : 0) | (above ? kWallAbove : 0));
+}
+
 void TileDisplay::gather() {
   window_.reset(kMaxFilterRadius);
   const int margin = margin_of_window();
+  const bool walled = std::ranges::any_of(around_, [](const auto& n) { return n.facts && n.facts->walls.any(); });
   for (int y = 0; y < window_.size; ++y) {
     const Step row = step_of(y - window_.radius - 1);
     for (int x = 0; x < window_.size; ++x) {
@@ -202,6 +215,7 @@ void TileDisplay::gather() {
       const auto of_nine = static_cast<std::size_t>((y + margin) * square_.size + x + margin);
       const int texel = row.texel * kTileSize + column.texel;
       window_.patch[at] = square_.patch[of_nine];
+      if (walled) window_.walls[at] = walls_at(row, column);
       if (!from.facts || !from.light || window_.patch[at] == kNobody) continue;
       if (from.facts->knows_albedo(texel) && from.light->count(Layer::kSharp, texel) > 0) {
         const glm::vec3 albedo = from.facts->albedo(texel);

@@ -68,6 +68,13 @@ class TileDisplay {
   };
   void look_around(TileId id, const LevelTiles& level);
   [[nodiscard]] bool wants_filter(const TexelMask& mask) const;
+  // Slot or window coordinate (payload starts at 0) -> which of the three tiles along an axis, and the texel in it.
+  struct Step {
+    int tile;
+    int texel;
+  };
+  [[nodiscard]] static Step step_of(int coordinate);
+  [[nodiscard]] std::uint8_t walls_at(const Step& row, const Step& column) const;
   // Of the nine tiles, and the texel in it.
   struct Place {
     std::size_t tile;

@@ -93,6 +93,7 @@ std::shared_ptr<TileFacts> TileFactsCache::get(TileId id, const TileSurfaces& su
   if (!surface) return nullptr;
   auto facts = std::make_shared<TileFacts>();
   for (int t = 0; t < kTileTexels; ++t) facts->patch[static_cast<std::size_t>(t)] = surface->patch(t);
+  facts->walls = surface->walls();
   if (surface->emits())
     facts->emission_means.assign(kTileTexels, glm::vec3(0.0f));  // not stored: learned together with albedo
   else if (const auto stored = store.read(id))

@@ -21,6 +21,7 @@ namespace darm::renderer {
 /// shaded.
 struct TileFacts {
   std::array<std::uint32_t, kTileTexels> patch{};
+  TileWalls walls;
   atlas::TileAlbedo albedo_means;
   std::vector<glm::vec3> emission_means;         ///< per texel, nits, of the same points; empty: nothing emits
   std::shared_ptr<const CoverageTile> coverage;  ///< null: opaque, or not learned

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "actors/renderer/renderer_messages.hpp"
+#include "actors/renderer/tile_walls.hpp"
 #include "actors/types/tile_id.hpp"
 
 namespace darm::renderer {
@@ -43,6 +44,8 @@ class TileSurface {
     (void)texel;
     return false;
   }
+  /// What stands between texels. Some hundred rays.
+  [[nodiscard]] virtual TileWalls walls() const { return {}; }
 };
 
 /// The surfaces of all tiles. Thread-safe.

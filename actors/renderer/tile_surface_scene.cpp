@@ -90,6 +90,8 @@ class SceneTile : public TileSurface {
            });
   }
 
+  [[nodiscard]] TileWalls walls() const override { return find_walls(*texels_, world_->transport->rays()); }
+
  private:
   [[nodiscard]] std::optional<trace::Surface> surface_at(int texel, const glm::vec2& xi) const {
     const auto point = texels_->sample(texel % kTileSize, texel / kTileSize, xi);
@@ -100,13 +102,7 @@ class SceneTile : public TileSurface {
 
   // The look goes a quarter of its length above the surface: a curved one is no wall to itself.
   [[nodiscard]] bool parted(const trace::Surface& a, const trace::Surface& b) const {
-    const glm::vec3 apart = b.position - a.position;
-    const float lift = 0.25f * std::sqrt(glm::dot(apart, apart)) + std::max(a.offset, b.offset);
-    trace::Ray look;
-    look.origin = a.position + a.geometric_normal * lift;
-    look.direction = b.position + b.geometric_normal * lift - look.origin;
-    look.tmax = 1;
-    return world_->transport->rays().occluded(look);
+    return renderer::parted(world_->transport->rays(), a, b, 0.25f * glm::length(b.position - a.position));
   }
 
   [[nodiscard]] std::optional<SurfacePoint> covered_point(int texel, Sampler& sampler) const {

@@ -162,5 +162,42 @@ TEST(IrradianceFilter, ADarkCornerIsNotBrightenedByWhatLiesInside) {
   EXPECT_NEAR(sum / kSlotSize, 0.0, 0.02);
 }
 
+// Light of 1 on one side and of 20 on the other, noise of half of it, in one patch: at first nothing but the wall
+// tells.
+TEST(IrradianceFilter, NothingComesThroughAWall) {
+  for (const bool across_rows : {true, false})
+    for (const int samples : {1, 4}) {
+      const auto behind = [&](int x, int y) { return (across_rows ? x : y) >= 23; };
+      auto w = sampled(
+          samples, [&](int x, int y, std::mt19937& r) { return (behind(x, y) ? 20.0f : 1.0f) * noisy(x, y, r); },
+          one_patch);
+      const auto near = [&](int x, int y) { return !behind(x, y) && behind(x + 3, y + 3); };
+      const double open = rms_off(w, filtered(w), 1, near);
+      for (int i = 0; i < w.size; ++i)
+        w.walls[static_cast<std::size_t>(across_rows ? i * w.size + 23 : 23 * w.size + i)] =
+            across_rows ? kWallBefore : kWallAbove;
+      const double walled = rms_off(w, filtered(w), 1, near);
+      EXPECT_LT(walled, 0.25) << samples;
+      EXPECT_GT(open, 4 * walled) << samples;
+    }
+}
+
+// A wall is no other patch: texels that are not parted by it are one's neighbours still.
+TEST(IrradianceFilter, AWallThatEndsLeavesTheWayAroundItOpen) {
+  auto w = sampled(1, noisy, one_patch);
+  const auto free = filtered(w);
+  for (int y = 0; y < w.size / 2; ++y) w.walls[static_cast<std::size_t>(y * w.size + 23)] = kWallBefore;
+  const auto walled = filtered(w);
+  const auto most_apart = [&](int first, int end) {
+    float most = 0;
+    for (int at = first * kSlotSize; at < end * kSlotSize; ++at)
+      most = std::max(most, std::abs(free[static_cast<std::size_t>(at)].irradiance[0] -
+                                     walled[static_cast<std::size_t>(at)].irradiance[0]));
+    return most;
+  };
+  EXPECT_GT(most_apart(0, 12), 0.01f);
+  EXPECT_LT(most_apart(28, kSlotSize), 0.003f);
+}
+
 }  // namespace
 }  // namespace darm::renderer

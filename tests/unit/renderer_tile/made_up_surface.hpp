@@ -23,6 +23,7 @@ struct MadeUpLight {
   std::function<void(TileId, int texel, std::uint32_t sample)> soft_asked = [](TileId, int, std::uint32_t) {};
   std::function<glm::vec3(TileId, int x, int y)> albedo = [](TileId, int, int) { return glm::vec3(0.5f); };
   std::function<float(TileId, int x, int y)> alpha = [](TileId, int, int) { return 1.0f; };
+  std::function<TileWalls(TileId)> walls = [](TileId) { return TileWalls{}; };
   bool translucent = false;
   glm::vec3 emission{0.0f};
 };
@@ -48,6 +49,7 @@ class MadeUpTile : public TileSurface {
     return world_.alpha(id_, t % kTileSize, t / kTileSize);
   }
   [[nodiscard]] bool translucent() const override { return world_.translucent; }
+  [[nodiscard]] TileWalls walls() const override { return world_.walls(id_); }
 
  private:
   TileId id_;

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <memory>
+#include <optional>
 
 #include "actors/renderer/display_curve.hpp"
 #include "actors/renderer/stored_light.hpp"
@@ -32,17 +34,17 @@ class TileDisplayTest : public ::testing::Test {
     if (survey_tile(*store_, id, mask, *world_.tile(id)).unshaded > 0) first_pass(id, mask);
     auto result = shade_tile(*store_, id, mask, passes, *world_.tile(id));
     EXPECT_TRUE(result);
-    facts_.get(id, world_, *store_)->learn_albedo(*world_.tile(id), mask);
+    facts_->get(id, world_, *store_)->learn_albedo(*world_.tile(id), mask);
     return *result;
   }
   ShadingResult first_pass(TileId id, const TexelMask& mask = TexelMask::all()) {
     auto result = shade_tile(*store_, id, mask, 1, *world_.tile(id));
     EXPECT_TRUE(result);
-    facts_.get(id, world_, *store_)->learn_albedo(*world_.tile(id), mask);
+    facts_->get(id, world_, *store_)->learn_albedo(*world_.tile(id), mask);
     return *result;
   }
   TilePicture draw(TileId id, float filter = 384, const TexelMask& mask = TexelMask::all()) {
-    TileDisplay display(*store_, facts_, DisplayOptions{1.0f, filter});
+    TileDisplay display(*store_, *facts_, DisplayOptions{1.0f, filter});
     auto picture = display.draw(id, level_, mask);
     EXPECT_TRUE(picture);
     return picture ? *picture : TilePicture{};
@@ -54,7 +56,7 @@ class TileDisplayTest : public ::testing::Test {
   std::filesystem::path dir_;
   std::unique_ptr<atlas::RadianceStore> store_;
   MadeUpWorld world_;
-  TileFactsCache facts_;
+  std::unique_ptr<TileFactsCache> facts_ = std::make_unique<TileFactsCache>();
   LevelTiles level_{3, 3};
   TileId middle_{0, 4};
 };
@@ -73,7 +75,7 @@ TEST_F(TileDisplayTest, a_patch_without_light_is_grey_where_asked_for_and_else_a
   TexelMask left;
   for (int y = 0; y < kTileSize; ++y) left.set_row(0, 14, y);
   first_pass(middle_, left);
-  TileDisplay display(*store_, facts_, DisplayOptions{1.0f, 384});
+  TileDisplay display(*store_, *facts_, DisplayOptions{1.0f, 384});
   const auto beside = display.draw(middle_, level_, left).value();
   EXPECT_EQ(code(beside, 25, 10, 0), code(beside, 3, 10, 0));
   EXPECT_EQ(code(beside, 25, 10, 1), 0);
@@ -85,12 +87,12 @@ TEST_F(TileDisplayTest, a_patch_without_light_is_grey_where_asked_for_and_else_a
 }
 
 TEST_F(TileDisplayTest, unshaded_tile_has_no_picture) {
-  TileDisplay display(*store_, facts_, {});
+  TileDisplay display(*store_, *facts_, {});
   EXPECT_FALSE(display.draw(middle_, level_, TexelMask::all()));
 }
 
 TEST_F(TileDisplayTest, a_level_that_is_not_there_has_no_picture) {
-  TileDisplay display(*store_, facts_, {});
+  TileDisplay display(*store_, *facts_, {});
   EXPECT_FALSE(display.draw(middle_, LevelTiles{}, TexelMask::all()));
 }
 
@@ -190,7 +192,7 @@ TEST_F(TileDisplayTest, light_that_is_not_shown_yet_is_there_for_paths) {
     return TexelLight{{}, glm::vec3(id == middle_ && t == 465 ? 9000.0f : 0.1f)};
   };
   for (std::uint32_t i = 0; i < 9; ++i) shade(TileId(0, i), 2);
-  TileDisplay display(*store_, facts_, DisplayOptions{1.0f, 384});
+  TileDisplay display(*store_, *facts_, DisplayOptions{1.0f, 384});
   ASSERT_TRUE(display.draw(middle_, level_, TexelMask::all()));
   const auto stored = stored_texels(*store_->read(middle_), display.filtered());
   double shown = 0, all = 0;
@@ -212,7 +214,7 @@ TEST_F(TileDisplayTest, texels_inside_other_geometry_do_not_darken_those_beside_
     return TexelLight{glm::vec3(0.1f), glm::vec3(0.4f * (0.8f + 0.4f * noise_of(id, t, s)))};
   };
   shade(middle_, 32);
-  TileDisplay display(*store_, facts_, DisplayOptions{1.0f, 384});
+  TileDisplay display(*store_, *facts_, DisplayOptions{1.0f, 384});
   const auto picture = display.draw(middle_, level_, TexelMask::all()).value();
   for (int y = 1; y < 19; ++y) {
     EXPECT_NEAR(code(picture, 10, y), srgb_code(0.5f), 3);
@@ -408,6 +410,30 @@ TEST_F(TileDisplayTest, coverage_is_the_mean_alpha_with_border) {
   EXPECT_EQ((*coverage)[5 * kSlotSize], 64);
   world_.world.alpha = [](TileId, int, int) { return 1.0f; };
   EXPECT_FALSE(cover_tile(middle_, level_, world_));
+}
+
+// On the border with the next tile, which knows of it or is the one that does not.
+TEST_F(TileDisplayTest, light_from_beyond_a_wall_is_not_shown_before_it) {
+  const TileId right(0, 5);
+  world_.world.light = [&](TileId id, int, std::uint32_t) {
+    return TexelLight{{}, glm::vec3(id == right ? 1.0f : 0.05f)};
+  };
+  const auto shown = [&](std::optional<TileId> knows, int bit) {
+    world_.world.walls = [=](TileId id) {
+      TileWalls walls;
+      if (knows && id == *knows) walls.rows.fill(1u << bit);
+      return walls;
+    };
+    facts_ = std::make_unique<TileFactsCache>();
+    first_pass(middle_);
+    first_pass(right);
+    const auto picture = draw(middle_);
+    return code(picture, kTileSize - 1, 15);
+  };
+  const int dark = srgb_code(0.05f);
+  EXPECT_GT(shown({}, 0), dark + 20);
+  EXPECT_NEAR(shown(middle_, kTileSize), dark, 1);
+  EXPECT_NEAR(shown(right, 0), dark, 1);
 }
 
 }  // namespace
