@@ -10,7 +10,6 @@ namespace darm::renderer {
 
 namespace {
 
-constexpr float kUndrawnError = 0.25f;        // of a tile of which nothing is known, as of what is filled
 constexpr std::uint32_t kHurriedPasses = 16;  // of a job: a tile full of texels is some tens of milliseconds
 
 // One job a tile: a tile has one writer.
@@ -116,7 +115,7 @@ CoarseCanvas::CoarseCanvas(LevelTiles tiles, std::uint32_t version)
   picture_->width = tiles.x * kTileSize;
   picture_->height = tiles.y * kTileSize;
   picture_->rgb.resize(std::size_t{picture_->width} * picture_->height * 3);
-  picture_->errors.assign(drawn_.size(), kUndrawnError);
+  picture_->errors.assign(drawn_.size(), kUnknownError);
 }
 
 void CoarseCanvas::put(std::uint32_t tile_index, const TileImage& image, float error) {

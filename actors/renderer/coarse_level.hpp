@@ -12,6 +12,9 @@
 
 namespace darm::renderer {
 
+/// Display error of what is not known to be as bright as it is: a quarter of the range, as of what is filled.
+inline constexpr float kUnknownError = 0.25f;
+
 /// The coarse level as a picture, sRGB, interleaved, top row first. No texel is left black for want of light.
 struct CoarsePicture {
   std::uint32_t version = 0;  ///< 1, 2, 3, ...

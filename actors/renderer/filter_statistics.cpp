@@ -63,8 +63,8 @@ float WindowStatistics::held(int area_class, std::size_t at) const {
   return std::max((side(0) + side(1)) * (side(2) + side(3)), kLeastHeld);
 }
 
-// In a row of the widest window, at most. All patches are in CoarseTex, which has 2048 texels a side: under 2^22 of
-// them, and names of their rings' stretches under 2^29.
+// That are told apart in a row: what lies behind more walls is one stretch. All patches are in CoarseTex, which has
+// 2048 texels a side: under 2^22 of them, and names of their rings' stretches under 2^29.
 constexpr std::uint32_t kStretches = 32;
 
 bool WindowStatistics::name_stretches(const FilterWindow& w) {

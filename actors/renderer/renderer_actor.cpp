@@ -18,9 +18,7 @@ namespace darm::renderer {
 namespace {
 
 constexpr std::size_t kPicturesPerSlice = 8;
-constexpr std::uint32_t kLastRenewed = 4;  // round of the coarse level
-// Of a picture whose light is not known to be as bright as it is: a quarter of the display's range, as what is filled.
-constexpr float kUnsettledError = 0.25f;
+constexpr std::uint32_t kLastRenewed = 4;     // round of the coarse level
 constexpr float kRareLight = 0.2f;            // of what the coarse level shows
 constexpr double kPressingShare = 0.5;        // of shading
 constexpr std::uint32_t kFirstOfBright = 16;  // samples of a texel that emitters shine on
@@ -429,7 +427,7 @@ float RendererActor::mean_lost_share(const Batch& batch) {
 void RendererActor::finish_pictures() {
   send_pictures();
   if (batch_->canvas && shared_->parts.coarse)
-    shared_->parts.coarse(batch_->canvas->finish(unsettled_until_ ? kUnsettledError : 0.0f));
+    shared_->parts.coarse(batch_->canvas->finish(unsettled_until_ ? kUnknownError : 0.0f));
   if (batch_->light)
     begin_stored_light();
   else
@@ -470,7 +468,7 @@ void RendererActor::send_pictures() {
     const TileJob& job = batch_->jobs[i];
     JobResult& r = batch_->results[i];
     if (job.coarse) continue;
-    if (r.picture && unsettled_until_) r.picture->error = std::max(r.picture->error, kUnsettledError);
+    if (r.picture && unsettled_until_) r.picture->error = std::max(r.picture->error, kUnknownError);
     if (!job.recall)
       schedule_.pictured(job.tile, r.picture ? r.picture->error : -1.0f,
                          r.picture && rare_light() ? r.picture->lost_share : 0.0f);

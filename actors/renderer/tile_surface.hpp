@@ -44,7 +44,7 @@ class TileSurface {
     (void)texel;
     return false;
   }
-  /// What stands between texels. Some hundred rays.
+  /// What stands between texels. A thousand rays at most.
   [[nodiscard]] virtual TileWalls walls() const { return {}; }
 };
 

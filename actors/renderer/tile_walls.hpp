@@ -21,8 +21,9 @@ struct TileWalls {
 };
 
 /// Of texels that hold surface. Looks along whole rows and columns, a quarter of a texel above the surface (and above
-/// what a curved one rises over the line), and halves those that are blocked: tens of rays in most tiles. A wall that
-/// is lower than that is not seen. A thousand rays at most; what they leave out counts as free.
+/// what a curved one rises over the line), and halves those that are blocked: sixty rays in an open tile of one patch.
+/// A stretch of less than six texels of a patch is not looked along. A wall that is lower than that is not seen. A
+/// thousand rays at most; what they leave out counts as free.
 [[nodiscard]] TileWalls find_walls(const atlas::TileTexels& texels, const trace::RayScene& rays);
 
 /// True if something stands between two points, `lift` above the surface at both. > 0; world units.

@@ -187,11 +187,10 @@ void grant_available(ViewDemand& demand, int coarse_level, const PageTable& tabl
 }
 
 ErrorOptions error_options(const ViewTone& tone) {
-  constexpr float kCoded = 0.0175f;  // as LossOptions::coarse_error
-  constexpr float kEnough = 0.15f;   // as far from black and from white noise has all the room it takes
+  constexpr float kEnough = 0.15f;  // as far from black and from white noise has all the room it takes
   ErrorOptions options;
   const float room = std::min({1.0f, tone.brightness / kEnough, tone.headroom / kEnough});
-  options.coarse_tex = std::hypot(tone.coarse_light, kCoded * room);
+  options.coarse_tex = std::hypot(tone.coarse_light, std::sqrt(LossOptions{}.coarse_error) / 255.0f * room);
   options.variety = tone.variety;
   return options;
 }
