@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "actors/tile_scheduler/chain_loss.hpp"
 #include "actors/tile_scheduler/coarseness.hpp"
 #include "actors/tile_scheduler/falling_weight.hpp"
 #include "actors/tile_scheduler/visibility.hpp"
